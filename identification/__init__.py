@@ -134,8 +134,7 @@ if TYPE_CHECKING:
     from identification.mapping.time_data import TimeDataMapping as TimeDataMapping
     from identification.mapping.time_records import map_time_data as map_time_data
     from identification.measurements import PeriodicVibration as PeriodicVibration
-    from identification.models.dynamic_model import DynamicModel as DynamicModel
-    from identification.models.kinds import dynamic_model as dynamic_model
+    from identification.models.dynamic_model import DynamicModel as DynamicModel, dynamic_model as dynamic_model
     from identification.models.modal.properties import (
         ExtrapolationError as ExtrapolationError,
         ModalProperties as ModalProperties,
@@ -156,8 +155,12 @@ if TYPE_CHECKING:
     )
     from identification.models.pnlss.features import Features as Features
     from identification.models.pnlss.fitting.fit import fit_pnlss as fit_pnlss
-    from identification.models.pnlss.fitting.result import FitHistory as FitHistory, PnlssFit as PnlssFit
-    from identification.models.pnlss.fitting.settings import FitProgress as FitProgress, FitSettings as FitSettings
+    from identification.models.pnlss.fitting.result import (
+        FitHistory as FitHistory,
+        FitProgress as FitProgress,
+        FitSettings as FitSettings,
+        PnlssFit as PnlssFit,
+    )
     from identification.models.pnlss.identify import identify_pnlss as identify_pnlss
     from identification.models.pnlss.linear_model import linear_pnlss as linear_pnlss
     from identification.models.pnlss.many import (
@@ -218,13 +221,15 @@ if TYPE_CHECKING:
         compare as compare,
         error_table as error_table,
     )
-    from identification.prediction.response_band import ResponseBand as ResponseBand
     from identification.prediction.simulated_runs import (
         ErrorSpectra as ErrorSpectra,
         OutputStretch as OutputStretch,
         SimulatedRun as SimulatedRun,
     )
-    from identification.prediction.steady_prediction import SteadyPrediction as SteadyPrediction
+    from identification.prediction.steady_prediction import (
+        ResponseBand as ResponseBand,
+        SteadyPrediction as SteadyPrediction,
+    )
     from identification.response_control.curves import ConstantForceCurve as ConstantForceCurve
     from identification.response_control.force_surface import (
         ForceSurface as ForceSurface,

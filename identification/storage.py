@@ -49,30 +49,24 @@ class Stored(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """How a type is stored where it departs from the rules of the module.
-
-    Parameters
-    ----------
-    inline
-        Array fields that are stored as lists among the attributes.
-    as_arrays
-        Number fields that are stored as arrays.
-    groups
-        Names of numbered groups by field, where they differ from the field's.
-    shared
-        Fields by the part that also has them: not stored while that part is not None.
-    kinds
-        Concrete types of an abstract one, by the text in their class attribute ``kind``.
-    upgrade
-        Changes arrays and attributes of earlier files, in place, to those of today.
-    """
+    """How a type is stored where it departs from the rules of the module."""
 
     inline: tuple[str, ...] = ()
+    """Array fields that are stored as lists among the attributes."""
     as_arrays: tuple[str, ...] = ()
+    """Number fields that are stored as arrays."""
     groups: Mapping[str, str] = field(default_factory=dict)
+    """Names of numbered groups by field, where they differ from the field's."""
     shared: Mapping[str, str] = field(default_factory=dict)
+    """Fields by the part that also has them: not stored while that part is not None."""
     kinds: Callable[[], Mapping[str, type]] | None = None
+    """Concrete types of an abstract one, by the text in their class attribute ``kind``."""
     upgrade: Callable[[dict[str, NDArray[Any]], dict[str, Any]], None] | None = None
+    """Changes arrays and attributes of earlier files, in place, to those of today."""
+
+
+_PLAIN = Layout()
+"""Layout of a type that declares none."""
 
 
 def stored(**layout: Any) -> Callable[[type[T]], type[T]]:
@@ -87,7 +81,7 @@ def stored(**layout: Any) -> Callable[[type[T]], type[T]]:
 
 def encode(result: Any) -> Stored:
     """Return arrays and JSON attributes of a dataclass."""
-    layout = _layout_of(type(result))
+    layout: Layout = getattr(type(result), "_layout", _PLAIN)
     found = Stored({}, {} if layout.kinds is None else {"kind": result.kind})
     for one in _fields(type(result)):
         name, value = one.name, getattr(result, one.name)
@@ -105,33 +99,25 @@ def encode(result: Any) -> Stored:
 
 
 def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "") -> T:
-    """Invert `encode`.
+    """Return the result of a type whose arrays and attributes `encode` returned.
 
-    Parameters
-    ----------
-    kind
-        Type of the result.
-    arrays, attributes
-        What `encode` returned.
-    where
-        Path of the result in a larger one, for messages, such as ``model/``.
-
-    Raises
-    ------
-    IdentificationError
-        If a field is missing, unknown or ill-shaped.
+    ``where``: path of the result in a larger one, for messages, such as ``model/``. Raises `IdentificationError` if a field is
+    missing, unknown or ill-shaped.
     """
-    layout = _layout_of(kind)
+    layout: Layout = getattr(kind, "_layout", _PLAIN)
     if not isinstance(attributes, Mapping):
         raise IdentificationError(f"is {attributes!r:.60}", where=_label(kind, where), allowed="a mapping of fields")
     held, told = dict(arrays), dict(attributes)
     if layout.kinds is not None:
-        kind = _concrete(kind, layout.kinds(), told.pop("kind", None))
+        kinds, named = layout.kinds(), told.pop("kind", None)
+        if named not in kinds:
+            raise IdentificationError(f"kind is {named!r}", where=_label(kind), allowed=kinds)
+        kind = kinds[named]
     if layout.upgrade is not None:
         with _fitting(kind):
             layout.upgrade(held, told)
-    hints, known = _hints(kind), _fields(kind)
-    if unknown := next((name for name in told if name not in hints), None):
+    hints, known = get_type_hints(kind), _fields(kind)
+    if unknown := next((name for name in told if name not in {one.name for one in known}), None):
         raise IdentificationError(f"{unknown!r} is missing or unknown", where=_label(kind, where))
     values: dict[str, Any] = {}
     for one in known:
@@ -152,7 +138,6 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "
 
 @contextmanager
 def _fitting(kind: type) -> Iterator[None]:
-    """Convert errors of wrong types and shapes to an `IdentificationError` that names the kind."""
     try:
         yield
     except IdentificationError:
@@ -162,7 +147,6 @@ def _fitting(kind: type) -> Iterator[None]:
 
 
 def _encoded(value: Any, name: str, group: str, arrays: dict[str, NDArray[Any]]) -> Any:
-    """Return the attribute of a value, `_ABSENT` if it is an array; add its arrays."""
     if isinstance(value, np.ndarray):
         arrays[name] = value
         return _ABSENT
@@ -193,7 +177,8 @@ def _decoded(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, o
         return attribute if attribute is _ABSENT else _plain(hint, attribute, name, owner)
     hint = options[0]
     if _is_array(hint):
-        return _array(name, arrays, attribute, optional)
+        missing = attribute is _ABSENT or (attribute is None and optional)
+        return np.asarray(arrays[name]) if name in arrays else attribute if missing else np.asarray(attribute)
     if get_origin(hint) is not None:
         return _several(hint, name, group, arrays, attribute, owner)
     if optional and isinstance(attribute, list):  # earlier files: none or one in a list
@@ -206,16 +191,7 @@ def _decoded(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, o
     return decode(hint, inside, {} if attribute is _ABSENT else attribute, f"{owner[1]}{group}/")
 
 
-def _array(name: str, arrays: Arrays, attribute: Any, optional: bool) -> Any:
-    if name in arrays:
-        return np.asarray(arrays[name])
-    if attribute is _ABSENT or (attribute is None and optional):
-        return attribute
-    return np.asarray(attribute)
-
-
 def _several(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, owner: _Owner) -> Any:
-    """Return a tuple or a mapping of dataclasses or arrays."""
     if attribute is _ABSENT:
         return attribute
     inner = get_args(hint)
@@ -245,12 +221,6 @@ def _misfit(owner: _Owner, name: str, value: Any) -> IdentificationError:
     return IdentificationError(f"{name} is {value!r}, which does not fit", where=_label(*owner))
 
 
-def _concrete(kind: type[T], kinds: Mapping[str, type], named: Any) -> type[T]:
-    if named not in kinds:
-        raise IdentificationError(f"kind is {named!r}", where=_label(kind), allowed=kinds)
-    return kinds[named]
-
-
 def _label(kind: type, where: str = "") -> str:
     """Return the name of a class as words, and the path of the object that is of it."""
     words = "".join(f" {letter}" if letter.isupper() else letter for letter in kind.__name__).split()
@@ -264,22 +234,8 @@ def _inside(arrays: Arrays, group: str) -> dict[str, NDArray[Any]]:
     return {name.removeprefix(head): array for name, array in arrays.items() if name.startswith(head)}
 
 
-def _layout_of(kind: type) -> Layout:
-    layout: Layout = getattr(kind, "_layout", _PLAIN)
-    return layout
-
-
-_PLAIN = Layout()
-"""Layout of a type that declares none."""
-
-
 def _fields(kind: type) -> tuple[Field[Any], ...]:
     return tuple(one for one in fields(kind) if one.init)
-
-
-def _hints(kind: type) -> dict[str, Any]:
-    hints = get_type_hints(kind)
-    return {one.name: hints[one.name] for one in _fields(kind)}
 
 
 @cache

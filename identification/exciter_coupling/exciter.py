@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
 from identification.storage import stored
-from identification.validation import finite_array, positive
+from identification.validation import positive, shaped_array
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -81,31 +81,20 @@ class VoltagePath:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ExciterLines:
-    """Measured lines with which an exciter was identified, as means over the realisations.
-
-    Parameters
-    ----------
-    frequency_hz
-        float[n].
-    force_per_volt, acceleration_per_volt
-        complex[n], force (N) and drive-point acceleration (m/s^2) per recorded volt.
-    noise
-        float[n], standard error of the force that the model leaves over, N/V.
-    """
+    """Measured lines with which an exciter was identified, as means over the realisations."""
 
     frequency_hz: Float
+    """float[n]."""
     force_per_volt: Complex
     acceleration_per_volt: Complex
+    """complex[n], force (N) and drive-point acceleration (m/s^2) per recorded volt."""
     noise: Float
+    """float[n], standard error of the force that the model leaves over, N/V."""
 
     def __post_init__(self) -> None:
         for name in ("frequency_hz", "force_per_volt", "acceleration_per_volt", "noise"):
             kind = np.complex128 if "per_volt" in name else np.float64
-            object.__setattr__(self, name, finite_array(name, getattr(self, name), kind, 1))
-            if getattr(self, name).shape != self.frequency_hz.shape:
-                raise IdentificationError(
-                    f"{getattr(self, name).size} values for {self.frequency_hz.size} lines", field=name
-                )
+            object.__setattr__(self, name, shaped_array(name, getattr(self, name), kind, (len(self.frequency_hz),)))
 
 
 def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
@@ -133,6 +122,8 @@ def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Non
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Exciter(Result):
     """Amplifier, exciter and stinger of one rig; the module docstring has the equations.
+
+    Raises `IdentificationError` if a value is not finite, the force per volt is zero, or the covariance has a wrong shape.
 
     Parameters
     ----------
@@ -162,11 +153,6 @@ class Exciter(Result):
         Remarks on the quality of the parameters, one line each.
     lines
         Measured lines of the identification; None if they were not kept.
-
-    Raises
-    ------
-    IdentificationError
-        If a value is not finite, the force per volt is zero, or the covariance has a wrong shape.
     """
 
     force_per_volt_n_v: float

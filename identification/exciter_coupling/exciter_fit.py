@@ -55,6 +55,8 @@ def identify_exciter(
 ) -> Exciter:
     """Identify an exciter from the spectra of a multisine.
 
+    Raises `IdentificationError` if there is a single period, too few lines, a channel is missing, or the voltage is zero.
+
     Parameters
     ----------
     spectra
@@ -86,11 +88,6 @@ def identify_exciter(
         from line to line. The covariance does not include model errors. On the shipped rigs these are 0.002 % (coil time
         constant 0.1 %, stinger damping 9 %) with stinger stiffness and resistance given; otherwise two to three times the
         standard error of the mass, c and b.
-
-    Raises
-    ------
-    IdentificationError
-        If there is a single period, too few lines, a channel is missing, or the voltage is zero.
     """
     rate = np.inf if sample_rate_hz is None else positive("sample_rate_hz", sample_rate_hz, "Hz")
     data = _lines(spectra, voltage, rate, lowest_hz, highest_hz)
@@ -215,7 +212,6 @@ class _Lines:
 
 
 def _path(p: Float) -> list[float]:
-    """Return delay, dispersion and coupling of the voltage path, the last parameters of the fit."""
     return [float(value) for value in p[len(PARAMETERS) :]]
 
 

@@ -5,8 +5,9 @@ requested level), and the equations of these unknowns. The coefficients are real
 `identification.harmonic_balance.basis`.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from identification.harmonic_balance.basis import complex_product
 from vibrolock.arrays import Complex, Float
 
 _NUDGE = 1e-5
-"""Relative step of the exciter's numerical derivatives with respect to frequency, which are accurate to ten digits."""
+"""Relative step of the exciter's numerical derivatives with respect to frequency, which are accurate to ten digits. Chosen."""
 
 
 class Equations(NamedTuple):
@@ -29,13 +30,15 @@ class Equations(NamedTuple):
     by_level: Float
 
 
-class Drive(Protocol):
+class Drive(ABC):
     """A periodic excitation of a model."""
 
     @property
     def size(self) -> int:
         """Number of the drive's own unknowns."""
+        return 0
 
+    @abstractmethod
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
         """Return the inputs' coefficients per unit of level and per unit of each unknown.
 
@@ -44,27 +47,25 @@ class Drive(Protocol):
 
     def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
         """Evaluate the equations at unknowns ``own`` and output coefficients float[n_coefficients, n_outputs]."""
+        return Equations(np.zeros(0), np.zeros((0, 0)), np.zeros((0, *outputs.shape)), np.zeros(0), np.zeros(0))
 
     def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
         """Return the unknowns at level 1 for a linear model; ``response`` complex[n_outputs] is per unit of driven input."""
+        return np.zeros(0)
 
+    @abstractmethod
     def voltage(self, own: Float) -> complex:
         """Amplitude of the voltage; NaN if there is none."""
 
 
 @dataclass(frozen=True)
-class Sine:
-    """A sine of fixed amplitude at one input: a force or a constant voltage."""
+class Sine(Drive):
+    """A sine of fixed amplitude at one input, a force or a constant voltage; it has no unknowns."""
 
     amplitude: float
     row: int
     n_inputs: int
     is_voltage: bool = False
-
-    @property
-    def size(self) -> int:
-        """Zero: a sine has no unknowns."""
-        return 0
 
     def inputs(self, coefficients: int) -> tuple[Float, Float]:
         """Return the coefficients of the sine."""
@@ -72,21 +73,13 @@ class Sine:
         given[1, self.row] = self.amplitude
         return given, np.zeros((coefficients, self.n_inputs, 0))
 
-    def equations(self, own: Float, level: float, frequency_hz: float, outputs: Float) -> Equations:
-        """Return empty equations: a sine has no unknowns."""
-        return Equations(np.zeros(0), np.zeros((0, 0)), np.zeros((0, *outputs.shape)), np.zeros(0), np.zeros(0))
-
-    def linear(self, frequency_hz: float, response: Complex, harmonics: int) -> Float:
-        """Return an empty array: a sine has no unknowns."""
-        return np.zeros(0)
-
     def voltage(self, own: Float) -> complex:
         """The amplitude, if the sine is a voltage; else NaN."""
         return complex(self.amplitude) if self.is_voltage else complex(np.nan)
 
 
 @dataclass(frozen=True)
-class HeldOutput:
+class HeldOutput(Drive):
     """A voltage sine whose amplitude, the only unknown, holds the fundamental or the RMS of the force at one output."""
 
     force_n: float
@@ -138,7 +131,7 @@ def level_reached(force: Float, held: str, force_n: float, level: float) -> tupl
 
 
 @dataclass(frozen=True)
-class Coupled:
+class Coupled(Drive):
     """An exciter that drives the force input from a voltage sine, with the reaction of the drive-point motion.
 
     Unknowns are the coefficients of the force without its static part, then those of the voltage. The phase reference is the

@@ -11,24 +11,19 @@ from identification.harmonic_balance.states import SteadyStates, motion_rows
 
 
 def held_notes(
-    model: Driven, force: str, exciter: Exciter | None, held_inputs: Mapping[str, float] | None = None
+    model: Driven, force: str, exciter: Exciter | None, held_inputs: Mapping[str, float] | None
 ) -> list[str]:
     """Return notes on what is held."""
-    return _held(model, force, exciter) + [
-        f"input '{name}' is held at {value:g}" for name, value in (held_inputs or {}).items()
-    ]
-
-
-def _held(model: Driven, force: str, exciter: Exciter | None) -> list[str]:
     where = f" of the exciter{f' ({exciter.source})' if exciter.source else ''}" if exciter else " at the model's input"
     voltage_driven = exciter is None and not any(channel.role == "force" for channel in model.inputs)
     maker = "the exciter inside the model" if voltage_driven else "the exciter"
-    return {
-        "pure-sine": ["held: a force without harmonics"],
-        "fundamental": [f"held: the force's fundamental; its harmonics are those that {maker} makes"],
-        "rms": [f"held: the RMS of the force; its harmonics are those that {maker} makes"],
-        "voltage": [f"held: the amplitude of a sine of voltage{where}"],
+    held = {
+        "pure-sine": "held: a force without harmonics",
+        "fundamental": f"held: the force's fundamental; its harmonics are those that {maker} makes",
+        "rms": f"held: the RMS of the force; its harmonics are those that {maker} makes",
+        "voltage": f"held: the amplitude of a sine of voltage{where}",
     }[force]
+    return [held, *(f"input '{name}' is held at {value:g}" for name, value in (held_inputs or {}).items())]
 
 
 def harmonics_notes(points: SteadyStates) -> list[str]:

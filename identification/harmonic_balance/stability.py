@@ -31,16 +31,8 @@ _MARGIN = 1e-9
 def multipliers(states_by: Float, turn: Float, basis: Basis, angle_rad: float) -> Complex:
     """complex[n_states]: multipliers over one sample, in the order of their centroids.
 
-    Parameters
-    ----------
-    states_by
-        float[size, n_states, size, n_states], ``T^+ f' T``.
-    turn
-        float[size, size], rotation matrix R of one sample.
-    basis
-        The Fourier series.
-    angle_rad
-        Phase advance per sample, rad.
+    ``states_by``: ``T^+ f' T``, float[size, n_states, size, n_states]. ``turn``: rotation matrix R of one sample, float[size,
+    size]. ``angle_rad``: phase advance per sample.
     """
     size, n = states_by.shape[:2]
     matrix = np.tensordot(turn.T, states_by, axes=1).reshape(size * n, size * n)  # R is orthogonal
@@ -76,16 +68,8 @@ def loss_of_stability(values: Complex, angle_rad: float, *, real: bool = True) -
     """Classify the loss of stability by the largest multiplier; return an empty text if it is stable.
 
     With a real positive multiplier over one period the vibration jumps (fold), with a real negative one the period doubles,
-    with a complex pair the amplitude is modulated (Neimark-Sacker).
-
-    Parameters
-    ----------
-    values
-        complex[k], multipliers over one sample.
-    angle_rad
-        Phase advance per sample, rad.
-    real
-        Whether real positive multipliers count.
+    with a complex pair the amplitude is modulated (Neimark-Sacker). ``values``: complex[k], multipliers over one sample, in
+    which the phase advances by ``angle_rad``. ``real``: whether real positive multipliers count.
     """
     samples = 2.0 * np.pi / angle_rad
     over_period = np.angle(np.exp(1j * np.angle(values) * samples))

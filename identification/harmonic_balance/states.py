@@ -14,17 +14,6 @@ from identification.harmonic_balance.stability import Loss, loss_of_stability
 from identification.prediction.steady_prediction import SteadyPrediction
 from vibrolock.arrays import Complex, Float
 
-_ARRAYS = (
-    "frequency_hz",
-    "states",
-    "inputs",
-    "outputs",
-    "voltage_v",
-    "multipliers",
-    "stable",
-    "state_use",
-    "input_use",
-)
 _FINE = 16
 """Samples per harmonic for the largest magnitude of a state, which is found to 0.5 % of the highest harmonic."""
 
@@ -108,7 +97,10 @@ class SteadyStates:
 
     def joined(self, other: "SteadyStates") -> "SteadyStates":
         """Return the points of both, those of this one first."""
-        arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _ARRAYS}
+        own, others = vars(self), vars(other)
+        arrays: dict[str, Any] = {
+            name: np.concatenate([value, others[name]]) for name, value in own.items() if isinstance(value, np.ndarray)
+        }
         return replace(self, **arrays, loss=(*self.loss, *other.loss))
 
 

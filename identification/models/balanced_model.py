@@ -11,12 +11,19 @@ from identification.exciter_coupling.exciter import Exciter
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulation import Simulation
 from identification.experiments.simulators import Simulator, simulated
-from identification.harmonic_balance.backbone import Resonances, resonances
 from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.driven import DrivenBalance
 from identification.harmonic_balance.drives import Drive
 from identification.harmonic_balance.notes import edge_notes, harmonics_notes, held_notes, loss_notes
-from identification.harmonic_balance.paths import Followed, followed, from_rest, polished, statically_stable
+from identification.harmonic_balance.paths import (
+    Followed,
+    Resonances,
+    followed,
+    from_rest,
+    polished,
+    resonances,
+    statically_stable,
+)
 from identification.harmonic_balance.setting_up import Held, band_around, drive_of, held_values, unknowns_near
 from identification.harmonic_balance.states import HarmonicResponse, SteadyStates, motion_rows, steady_states
 from identification.models.dynamic_model import DynamicModel, SteadyRequest

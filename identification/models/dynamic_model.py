@@ -1,7 +1,7 @@
 """What a dynamic model of any kind answers, and what is asked of it."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -16,6 +16,7 @@ from identification.harmonic_balance.states import HarmonicResponse, SteadyState
 from identification.linear.modes import LinearModes
 from identification.prediction.steady_prediction import SteadyPrediction
 from vibrolock.arrays import Complex, Float
+from vibrolock.on_use import Registry
 
 HARMONICS = 7
 """Default number of harmonics. Chosen: a hardening beam's response changes by less than 1e-3 with more."""
@@ -121,3 +122,32 @@ class DynamicModel(ABC):
     def cannot(self, what: str, hint: str) -> IdentificationError:
         """Return the error for something that the kind does not answer."""
         return IdentificationError(f"model: a {self.kind} cannot {what}; {hint}")
+
+
+KINDS: Registry[Callable[[object], DynamicModel]] = Registry(
+    {
+        "NonlinearMode": "identification.models.modal.dynamics:ModalDynamics",
+        "PnlssModel": "identification.models.pnlss.dynamics:PnlssDynamics",
+        "StructuredModel": "identification.models.structured.dynamics:StructuredDynamics",
+        "StructuredFit": "identification.models.structured.dynamics:StructuredDynamics",
+    }
+)
+"""Answers by the name of the class of a model; imported on use, so that one kind does not load the others."""
+
+
+def has_kind(model: object) -> bool:
+    """Return whether a model is of one of the kinds."""
+    return isinstance(model, DynamicModel) or type(model).__name__ in KINDS
+
+
+def dynamic_model(model: object) -> DynamicModel:
+    """Return the answers of a model of any kind; a `DynamicModel` gives its own.
+
+    Raises `IdentificationError` for anything else.
+    """
+    if isinstance(model, DynamicModel):
+        return model
+    name = type(model).__name__
+    if name not in KINDS:
+        raise IdentificationError(f"model: is a {name}, allowed are {', '.join(KINDS)}")
+    return KINDS[name](model)

@@ -6,9 +6,8 @@ from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.models.modal.sweep_prediction import SweepPrediction
 from identification.prediction.comparison import PredictionError
-from identification.prediction.response_band import ResponseBand
 from identification.prediction.simulated_runs import SimulatedRun
-from identification.prediction.steady_prediction import SteadyPrediction
+from identification.prediction.steady_prediction import ResponseBand, SteadyPrediction
 from identification.signals.transients import Transient
 from vibrolock.results import Result
 
@@ -16,6 +15,8 @@ from vibrolock.results import Result
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Predictions(Result):
     """Predicted steady responses and sweeps; references and errors are None where there is no reference.
+
+    Raises `IdentificationError` if there are not as many references or errors as predictions.
 
     Parameters
     ----------
@@ -31,11 +32,6 @@ class Predictions(Result):
         Name of what was tested.
     notes
         Remarks on the predictions, one line each.
-
-    Raises
-    ------
-    IdentificationError
-        If there are not as many references or errors as predictions.
     """
 
     steady: tuple[SteadyPrediction, ...] = ()

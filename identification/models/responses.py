@@ -11,10 +11,8 @@ from identification.experiments.simulation import Simulation
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import HarmonicResponse, SteadyStates
 from identification.linear.modes import LinearModes
-from identification.models.dynamic_model import LARGEST_RANGE_USE, DynamicModel, SteadyRequest
-from identification.models.kinds import dynamic_model
-from identification.prediction.response_band import ResponseBand, band_of_responses
-from identification.prediction.steady_prediction import SteadyPrediction
+from identification.models.dynamic_model import LARGEST_RANGE_USE, DynamicModel, SteadyRequest, dynamic_model
+from identification.prediction.steady_prediction import ResponseBand, SteadyPrediction, band_of_responses
 from identification.renamed import formerly
 
 _COMMON = {"force", "harmonics", "points", "largest_range_use"}
@@ -62,6 +60,10 @@ def frequency_response(
 ) -> SteadyPrediction:
     """Predict the steady response of a model to a constant force or voltage, on all branches.
 
+    Raises `IdentificationError` if options do not fit the model, a number is not allowed, or no vibration is found, and
+    `ExtrapolationError` if the response of a nonlinear mode needs more than ``largest_range_use`` times the largest identified
+    amplitude.
+
     Parameters
     ----------
     model
@@ -99,13 +101,6 @@ def frequency_response(
     largest_range_use
         Largest amplitude, state or displacement over the largest in the data of the identification. A path that exceeds it
         ends there, with a note; a nonlinear mode refuses. ``inf`` allows any extrapolation.
-
-    Raises
-    ------
-    IdentificationError
-        If options do not fit the model, a number is not allowed, or no vibration is found.
-    ExtrapolationError
-        If the response of a nonlinear mode needs more than ``largest_range_use`` times the largest identified amplitude.
     """
     found = dynamic_model(model)
     return found.frequency_response(*_request(found, force_n, ResponseOptions, options))
@@ -132,6 +127,8 @@ def response_band(
 ) -> ResponseBand:
     """Propagate the errors of a model to a predicted response, by Monte Carlo.
 
+    Raises `IdentificationError` if the model has no standard errors, or ``draws`` is below 20.
+
     Parameters
     ----------
     model
@@ -142,11 +139,6 @@ def response_band(
         Number of draws, at least 20.
     seed
         Seed of the random numbers.
-
-    Raises
-    ------
-    IdentificationError
-        If the model has no standard errors, or ``draws`` is below 20.
     """
     if draws < 20:
         raise IdentificationError(field="draws", value=draws, allowed="at least 20")
@@ -199,11 +191,6 @@ def backbone(
 
     Other parameters are those of `frequency_response`. ``near_hz``: the backbone begins at the mode of small vibrations that
     is nearest, by default at that which moves the drive point most.
-
-    Raises
-    ------
-    IdentificationError
-        If options do not fit the model, the mode has no phase resonance, or the backbone ends before the force.
     """
     found = dynamic_model(model)
     return found.backbone(_request(found, force_n, BackboneOptions, options)[0], near_hz)
@@ -211,6 +198,9 @@ def backbone(
 
 def coupled_run(model: object, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None) -> Simulation:
     """Simulate a model with the exciter at its force input, both from rest, under a recorded voltage.
+
+    Raises `IdentificationError` if values are NaN or infinite, the model lacks these channels, or no stable filter for the
+    reaction is found.
 
     Parameters
     ----------
@@ -225,11 +215,6 @@ def coupled_run(model: object, exciter: Exciter, voltage_v: ArrayLike, *, lowest
         Frequency above which the exciter's reaction is exact; below it the reaction fades. Default: 0.8 times the lowest
         frequency of a PNLSS model's training; if that is unknown, and for structured models, half the resonance of small
         vibrations.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, the model lacks these channels, or no stable filter for the reaction is found.
     """
     return dynamic_model(model).coupled_run(exciter, voltage_v, lowest_hz)
 

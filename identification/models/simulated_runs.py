@@ -1,16 +1,14 @@
 """Experiments as a model simulates them: errors, their spectra, and a stretch of time. For any model that can be simulated."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.experiments.checks import check_not_zero
+from identification.experiments.checks import belongs, check_not_zero
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulation import Simulation
 from identification.experiments.simulators import Simulator
 from identification.models.balanced_model import begun_at_rest
-from identification.models.kinds import dynamic_model, has_kind
+from identification.models.dynamic_model import dynamic_model, has_kind
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 from vibrolock.arrays import Float
 
@@ -23,7 +21,7 @@ def simulated_run(
     Raises `IdentificationError` if channels or sample rates of model and experiment differ, or an output is zero where it
     counts.
     """
-    check_channels(model, experiment)
+    belongs(model, experiment, f"experiment '{experiment.name}'")
     check_not_zero(experiment, f"experiment '{experiment.name}'")
     run = run_of(model, experiment, initial_state)
     measured = experiment.counted_outputs
@@ -85,7 +83,7 @@ def output_stretch(
     The run begins from rest or from ``initial_state``, which is estimated if the experiment requires it. Raises
     `IdentificationError` if channels or sample rates of model and experiment differ.
     """
-    check_channels(model, experiment)
+    belongs(model, experiment, f"experiment '{experiment.name}'")
     run = run_of(model, experiment, initial_state)
     largest = experiment.counted_from + int(np.argmax(np.abs(experiment.counted_outputs[0])))
     last = experiment.outputs.shape[1]
@@ -108,26 +106,7 @@ def run_of(model: Simulator, experiment: Experiment, initial_state: Float | None
 
     Raises `IdentificationError` if channels or sample rates differ, or the model cannot begin as the experiment does.
     """
-    check_channels(model, experiment)
+    belongs(model, experiment, f"experiment '{experiment.name}'")
     if has_kind(model):
         return dynamic_model(model).simulate_experiment(experiment, initial_state)
     return begun_at_rest(model, experiment, initial_state)
-
-
-def check_channels(model: Simulator, experiment: Experiment) -> None:
-    """Raise `IdentificationError` unless the experiment has the model's channels and rate."""
-    for what, mine, theirs in (
-        ("inputs", model.inputs, experiment.input_channels),
-        ("outputs", model.outputs, experiment.output_channels),
-    ):
-        names: Sequence[str] = [channel.name for channel in mine]
-        others = [channel.name for channel in theirs]
-        if names != others:
-            raise IdentificationError(
-                f"experiment '{experiment.name}': {what} are {', '.join(others)}, the model's {', '.join(names)}"
-            )
-    if abs(model.sample_rate_hz / experiment.sample_rate_hz - 1.0) > 1e-9:
-        raise IdentificationError(
-            f"experiment '{experiment.name}': sampled at {experiment.sample_rate_hz:g} Hz, the model at "
-            f"{model.sample_rate_hz:g} Hz"
-        )

@@ -114,6 +114,8 @@ def compare(
 ) -> Comparison:
     """Compare a predicted frequency response with a measured or otherwise computed one.
 
+    Raises `IdentificationError` if prediction and reference have no point in common, or the channel was not predicted.
+
     Parameters
     ----------
     prediction
@@ -128,11 +130,6 @@ def compare(
         phase lag of the reference; the phase distinguishes all branches, including unstable ones.
     phase_window_deg
         Only points of the reference whose lag differs by at most this from 90 degrees count in the envelope error.
-
-    Raises
-    ------
-    IdentificationError
-        If prediction and reference have no point in common, or the channel was not predicted.
     """
     IdentificationError.unless_one_of("over", over, get_args(Over))
     order = MOTION_ORDER[reference.kind]

@@ -1,4 +1,4 @@
-"""Changes from run to run as part of a model: its linear part shifts along its modes."""
+"""DerivativeTables from run to run as part of a model: its linear part shifts along its modes."""
 
 from typing import TYPE_CHECKING
 

@@ -73,23 +73,12 @@ class ModalProperties:
     def of(
         cls, mode: NonlinearMode, *, damping: Damping = "fundamental", largest_range_use: float = REFUSED_BEYOND
     ) -> "ModalProperties":
-        """Compute the properties of an identified mode.
+        """Compute the properties of an identified mode, with damping from the power of the fundamental or of all harmonics.
 
-        Parameters
-        ----------
-        mode
-            The mode. Levels may be in any order and repeated; levels whose q differs by less than 2 % are averaged. If modal
-            amplitudes are unknown but apparent masses m are known (stepped sine), ``q = |X| sqrt(m)`` and the drive shape is
-            ``1 / sqrt(m)`` of the measured point, m being interpolated from level to level like w and z.
-        damping
-            Whether damping is computed from the power of the fundamental alone or of all harmonics.
-        largest_range_use
-            Largest q that is allowed, over the largest identified; ``inf`` allows any.
-
-        Raises
-        ------
-        IdentificationError
-            If no level has amplitude, frequency and damping, or if w or z is not positive at a level.
+        Levels may be in any order and repeated; those whose q differs by less than 2 % are averaged. If modal amplitudes are
+        unknown but apparent masses m are known (stepped sine), ``q = |X| sqrt(m)`` and the drive shape is ``1 / sqrt(m)`` of
+        the measured point, m being interpolated from level to level like w and z. Raises `IdentificationError` if no level has
+        amplitude, frequency and damping, or if w or z is not positive at a level.
         """
         IdentificationError.unless_one_of("damping", damping, _DAMPING_FIELD)
         shape = 1.0 / np.sqrt(mode.apparent_mass_kg)
@@ -242,6 +231,5 @@ def _slope(x: Float, y: Float) -> float:
 
 
 def _differentiated(coefficients: Float) -> Float:
-    """Return the coefficients of the derivatives of cubics."""
     c0, c1, c2, _ = coefficients
     return np.array([np.zeros_like(c0), 3.0 * c0, 2.0 * c1, c2])

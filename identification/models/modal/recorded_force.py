@@ -44,6 +44,8 @@ def recorded_force_response(
     the state nearest to the previous one. Near a fold, small errors of model or force decide whether a state exists. A state
     is therefore accepted there if it exists at a force within 2 % of the recorded one.
 
+    Raises `ExtrapolationError` if a point needs more than ``largest_range_use`` times the largest modal amplitude identified.
+
     Parameters
     ----------
     mode
@@ -60,11 +62,6 @@ def recorded_force_response(
     SteadyPrediction
         Its ``force`` is ``recorded``, ``force_n`` is the median of the forces, and there are no folds. ``stable`` refers to
         constant force nevertheless.
-
-    Raises
-    ------
-    ExtrapolationError
-        If a point needs more than ``largest_range_use`` times the largest modal amplitude identified.
     """
     properties = ModalProperties.of(mode, largest_range_use=largest_range_use)
     by_force = reference.controlled == "force"

@@ -60,18 +60,12 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class OneMode:
-    """One nonlinear mode under a constant force.
-
-    Parameters
-    ----------
-    properties
-        w(q), z(q) and drive shape.
-    fundamental_n
-        Peak of the fundamental of the force over q, N.
-    """
+    """One nonlinear mode under a constant force."""
 
     properties: ModalProperties
+    """w(q), z(q) and drive shape."""
     fundamental_n: Callable[[Float], Float]
+    """Peak of the fundamental of the force over q, N."""
 
     def modal_force(self, q: Float) -> Float:
         """float[n]: modal force L, kg^1/2 m/s^2."""
@@ -159,17 +153,9 @@ def fundamental_motion(
 ) -> tuple[tuple[str, ...], Complex]:
     """Return the names of the channels, drive point first, and their displacement complex[n, n_channels] relative to the force.
 
-    Parameters
-    ----------
-    mode, properties
-        The nonlinear mode and its properties over the modal amplitude.
-    q, omega, fundamental_n
-        float[n], modal amplitude, frequency W (rad/s) and peak of the fundamental of the force (N) of each state.
-    modes
-        Linear modes for the other channels: the shape of the tested mode is scaled by the drive-point displacement. None for
-        the drive point alone.
-    residuals
-        Whether to add the linear response of all modes but the tested one.
+    ``q``, ``omega``, ``fundamental_n``: float[n], modal amplitude, frequency W (rad/s) and peak of the fundamental of the force
+    (N) of each state. ``modes`` give the other channels, to which the shape of the tested mode is scaled by the drive-point
+    displacement, and with ``residuals`` the linear response of all modes but the tested one.
     """
     lag = np.angle(modal_stiffness(properties, q, omega)) + _turn_rad(mode, q)
     drive = properties.drive_shape(q) * q * np.exp(-1j * lag)

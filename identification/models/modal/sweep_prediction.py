@@ -6,8 +6,7 @@ import numpy as np
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
-from identification.models.modal.properties import ModalProperties
-from identification.models.modal.sweep_inputs import BY_ZERO_CROSSINGS, SweepInput
+from identification.models.modal.sweep_inputs import BY_ZERO_CROSSINGS
 from identification.prediction.comparison import PredictionError
 from identification.signals.transients import Transient
 from vibrolock.arrays import Complex, Float
@@ -57,46 +56,6 @@ class SweepPrediction(Result):
     notes: tuple[str, ...] = ()
     simulated_range_use: float | None = None
     unbounded_at_s: float | None = None
-
-    @classmethod
-    def of_modal_amplitude(
-        cls,
-        given: SweepInput,
-        every: slice,
-        properties: ModalProperties,
-        amplitude: Complex,
-        rate: Complex,
-        drive: Complex,
-        load: Complex,
-        others: Complex | None,
-        notes: tuple[str, ...],
-    ) -> "SweepPrediction":
-        """Compute a prediction from the modal amplitude and its rate (complex[n], at the instants ``every`` of the input).
-
-        ``F = N - phi (L Q + L' Q')``, ``X_d = phi Q + r F + r' F'``, velocity ``(s + d/dt) X_d``; ``others`` holds r and r'
-        of the other modes (complex[n, 2]); None if the force is imposed.
-        """
-        s = 2j * np.pi * given.frequency_hz[every]
-        step = 2.0 * given.step_s
-        phi = properties.drive_shape(np.abs(amplitude))
-        force = drive - phi * (load[:, 0] * amplitude + load[:, 1] * rate)
-        drive_m = phi * amplitude
-        if others is not None:
-            drive_m = drive_m + others[:, 0] * force + others[:, 1] * _rate(force, step)
-        drive_m_s = s * drive_m + _rate(drive_m, step)
-        return cls(
-            time_s=given.time_s[every],
-            frequency_hz=given.frequency_hz[every],
-            modal_amplitude=amplitude,
-            drive_m=drive_m,
-            drive_m_s=drive_m_s,
-            drive_m_s2=s * drive_m_s + _rate(drive_m_s, step),
-            force=force,
-            largest_identified=properties.q_range[1],
-            window_periods=given.window_periods,
-            origin=given.origin,
-            notes=notes,
-        )
 
     @property
     def range_use(self) -> float:
@@ -185,8 +144,3 @@ def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = 
         range_use=prediction.range_use,
         notes=prediction.notes,
     )
-
-
-def _rate(values: Complex, step_s: float) -> Complex:
-    """Rate of change by central differences."""
-    return np.gradient(values, step_s) if values.size > 1 else np.zeros_like(values)

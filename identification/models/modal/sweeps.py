@@ -65,6 +65,9 @@ def predict_sweep(
 ) -> SweepPrediction:
     """Predict the response of one nonlinear mode to a sweep.
 
+    Raises `ExtrapolationError` if the modal amplitude exceeds ``largest_range_use`` times the largest identified one, and
+    `IdentificationError` if input and exciter do not match.
+
     Parameters
     ----------
     mode
@@ -89,13 +92,6 @@ def predict_sweep(
     -------
     SweepPrediction
         Prediction from the first instant of the input, in the steady state there.
-
-    Raises
-    ------
-    ExtrapolationError
-        If the modal amplitude exceeds ``largest_range_use`` times the largest identified one.
-    IdentificationError
-        If input and exciter do not match.
     """
     properties = mode
     if isinstance(mode, NonlinearMode):
@@ -159,7 +155,6 @@ def _integrate(
     others: Complex | None,
     notes: tuple[str, ...],
 ) -> SweepPrediction:
-    """Integrate the slow flow over every other instant and return the resulting prediction."""
     p = properties
     kept = slice(0, 2 * ((given.time_s.size - 1) // 2) + 1)
     s = 2j * np.pi * given.frequency_hz[kept]
@@ -190,9 +185,30 @@ def _integrate(
     range_use = float(np.max(np.abs(amplitude)) / p.q_range[1])
     if range_use > FLAGGED_BEYOND:
         notes += (f"reaches {range_use:.2f} times the largest modal amplitude identified",)
-    return SweepPrediction.of_modal_amplitude(
-        given, every, p, amplitude, rate, drive[every], load[every], None if others is None else others[every], notes
+    drive, load, s, phi = drive[every], load[every], s[every], p.drive_shape(np.abs(amplitude))
+    # F = N - phi (L Q + L' Q'), X_d = phi Q + r F + r' F', velocity (s + d/dt) X_d
+    force = drive - phi * (load[:, 0] * amplitude + load[:, 1] * rate)
+    drive_m = phi * amplitude
+    if others is not None:
+        drive_m = drive_m + others[every, 0] * force + others[every, 1] * _rate(force, step)
+    drive_m_s = s * drive_m + _rate(drive_m, step)
+    return SweepPrediction(
+        time_s=given.time_s[every],
+        frequency_hz=given.frequency_hz[every],
+        modal_amplitude=amplitude,
+        drive_m=drive_m,
+        drive_m_s=drive_m_s,
+        drive_m_s2=s * drive_m_s + _rate(drive_m_s, step),
+        force=force,
+        largest_identified=p.q_range[1],
+        window_periods=given.window_periods,
+        origin=given.origin,
+        notes=notes,
     )
+
+
+def _rate(values: Complex, step_s: float) -> Complex:
+    return np.gradient(values, step_s) if values.size > 1 else np.zeros_like(values)
 
 
 def _settled(p: ModalProperties, s: complex, drive: complex, load: Complex, tables: _Tables) -> complex:

@@ -72,7 +72,6 @@ class PnlssBalance(DrivenBalance):
         )
 
     def _evaluated(self, states: Float, inputs: Float) -> tuple[Float, ...]:
-        """Next states, outputs and their derivatives, at all samples of the period."""
         v = self.basis.to_time @ np.concatenate([states, inputs], axis=1)
         along_period(self._matrices, *self._tables, v, *self._work, *self._samples)
         return self._samples

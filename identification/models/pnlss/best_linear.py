@@ -94,6 +94,9 @@ def best_linear_responses(
     power and its weight, as in the fit over time. For the responses of one level, pass only the experiments of that level.
     Experiments that are not periodic are ignored.
 
+    Raises `IdentificationError` if no experiment is periodic, one is declared periodic but is not, there are fewer
+    realisations than inputs, inputs are linearly dependent, or no line is excited.
+
     Parameters
     ----------
     experiments
@@ -109,12 +112,6 @@ def best_linear_responses(
     FrequencyResponseMatrix
         Responses at the excited lines. The total covariance needs two realisations per input, the noise covariance two
         periods; the notes name a covariance that is unknown.
-
-    Raises
-    ------
-    IdentificationError
-        If no experiment is periodic, one is declared periodic but is not, there are fewer realisations than inputs, inputs
-        are linearly dependent, or no line is excited.
     """
     same_channels(experiments)
     chosen, notes = periodic_ones(experiments)

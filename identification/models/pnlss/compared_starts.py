@@ -5,14 +5,14 @@ Good starts show early (successive halving: Jamieson and Talwalkar, AISTATS 2016
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from identification.experiments.experiment import Experiment
 from identification.fitting.result import Ending, FitStatus
 from identification.models.pnlss.fitting.fit import fit_pnlss
-from identification.models.pnlss.fitting.result import PnlssFit
-from identification.models.pnlss.fitting.settings import FitProgress, FitSettings
+from identification.models.pnlss.fitting.result import FitProgress, FitSettings, PnlssFit
 from identification.models.pnlss.model import PnlssModel
 
 STARTS = 4
@@ -37,14 +37,14 @@ def best_of_starts(
     for iterations in _ROUNDS:
         limits = replace(settings, iterations=min(settings.iterations, iterations), patience=0)
         for number in left:
-            told = None if progress is None else _told(progress, f"start {number + 1} of {len(starts)}")
+            stage = f"start {number + 1} of {len(starts)}"
             try:
                 fits[number] = fit_pnlss(
                     starts[number],
                     experiments,
                     validation=validation,
                     settings=limits,
-                    progress=told,
+                    progress=None if progress is None else partial(_staged, progress, stage),
                     resume=fits.get(number),
                 )
             except KeyboardInterrupt:
@@ -65,8 +65,8 @@ def interrupted(fit: PnlssFit) -> PnlssFit:
     return replace(fit, **Ending.of(FitStatus.INTERRUPTED)._asdict())
 
 
-def _told(progress: Callable[[FitProgress], None], stage: str) -> Callable[[FitProgress], None]:
-    return lambda at: progress(replace(at, stage=stage))
+def _staged(progress: Callable[[FitProgress], None], stage: str, at: FitProgress) -> None:
+    progress(replace(at, stage=stage))
 
 
 def _error(found: PnlssFit) -> float:

@@ -147,7 +147,12 @@ class ErrorTable:
                 continue
             for test, experiments in ((SAME_LEVEL, job.left_out), *levels.items()):
                 unseen = [one for one in experiments if test != job.training_set and not job.seen(one)]
-                tests += _tests(models[job.name], job, test, unseen, index)
+                if not unseen:
+                    continue
+                errors = pnlss_errors(models[job.name], unseen)
+                rows = zip(errors.names, errors.relative[:, index].tolist(), errors.range_use.tolist(), strict=True)
+                of = {"model": job.name, "training_set": job.training_set, "test": test}
+                tests += [ModelTest(**of, experiment=name, error=error, range_use=use) for name, error, use in rows]
         return cls(
             output=names[index],
             levels=tuple(levels),
@@ -212,26 +217,6 @@ class ErrorTable:
         return rows
 
 
-def _tests(
-    model: PnlssModel | Simulator, job: ModelJob, test: str, experiments: Sequence[Experiment], output: int
-) -> list[ModelTest]:
-    if not experiments:
-        return []
-    errors = pnlss_errors(model, experiments)
-    return [
-        ModelTest(
-            model=job.name,
-            training_set=job.training_set,
-            test=test,
-            experiment=name,
-            error=float(error),
-            range_use=float(range_use),
-        )
-        for name, error, range_use in zip(errors.names, errors.relative[:, output], errors.range_use, strict=True)
-    ]
-
-
 def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Format a table with columns as wide as needed."""
     widths = [max(len(row[column]) for row in (heads, *rows)) for column in range(len(heads))]
     return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in (heads, *rows)]

@@ -11,7 +11,7 @@ from identification.experiments.errors import PnlssErrors, errors_of
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulation import Simulation
 from identification.experiments.simulators import Simulator, simulated
-from identification.models.pnlss.fitting.initial_states import SAMPLES, fitted_initial_state
+from identification.models.pnlss.fitting.blocks import SAMPLES, fitted_initial_state
 from identification.models.pnlss.fitting.parameters import Parameters
 from identification.models.pnlss.fitting.records import records_of
 from identification.models.pnlss.model import PnlssModel

@@ -62,6 +62,9 @@ def function_of(name: str) -> FeatureFunction:
 class Features:
     """Features ``phi(v)`` of the variables ``v = (x, u)``: first monomials, then functions of weighted sums.
 
+    Raises `IdentificationError` if shapes do not agree, powers are negative, monomials are below degree two or given twice,
+    limits are not above zero, or functions are unknown.
+
     Parameters
     ----------
     variables
@@ -77,12 +80,6 @@ class Features:
     limits
         float[variables], magnitude at which monomials clip a variable; inf for none. Limits keep the features bounded and
         have no effect within the limits.
-
-    Raises
-    ------
-    IdentificationError
-        If shapes do not agree, powers are negative, monomials are below degree two or given twice, limits are not above zero,
-        or functions are unknown.
     """
 
     variables: int
@@ -179,7 +176,6 @@ class Features:
 
     @property
     def _functions(self) -> tuple[str, ...]:
-        """Name of the function of every row of weights."""
         return self.functions or ("tanh",) * len(self.weights)
 
     def names(self, states: int) -> tuple[str, ...]:

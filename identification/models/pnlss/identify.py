@@ -18,8 +18,7 @@ from identification.models.pnlss.compared_starts import STARTS, best_of_starts, 
 from identification.models.pnlss.features import Features
 from identification.models.pnlss.fitting.checks import check_enough, check_signals
 from identification.models.pnlss.fitting.fit import fit_pnlss
-from identification.models.pnlss.fitting.result import PnlssFit
-from identification.models.pnlss.fitting.settings import FitProgress, FitSettings
+from identification.models.pnlss.fitting.result import FitProgress, FitSettings, PnlssFit
 from identification.models.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.models.pnlss.model import PnlssModel
 from identification.models.pnlss.saturating_starts import saturating_starts
@@ -46,6 +45,9 @@ def identify_pnlss(
     progress: Callable[[FitProgress], None] | None = None,
 ) -> PnlssFit:
     """Identify a nonlinear state-space model.
+
+    Raises `IdentificationError` if the experiments cannot be used or do not support this number of states; see
+    `best_linear_responses`, `fit_pnlss`.
 
     Parameters
     ----------
@@ -89,11 +91,6 @@ def identify_pnlss(
     PnlssFit
         The notes of its model give the errors of the linear start over frequency and over time, and those of the nonlinear
         model. Ctrl-C returns the best fit so far, marked ``interrupted``; before there is a fit it raises KeyboardInterrupt.
-
-    Raises
-    ------
-    IdentificationError
-        If the experiments cannot be used or do not support this number of states; see `best_linear_responses`, `fit_pnlss`.
     """
     chosen = FitSettings() if settings is None else settings
     if not isinstance(states, int | np.integer) or states < 1:
@@ -142,7 +139,6 @@ def _parameters(
 
 
 def _saturating(saturating: int | tuple[int, int], outputs: Sequence[Channel]) -> tuple[int, int]:
-    """Return the numbers of saturating features in the state and in the output equation."""
     if isinstance(saturating, tuple):
         counts = saturating
     else:

@@ -61,7 +61,6 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
 
 
 def _block_rows(responses: FrequencyResponseMatrix, states: int, sample_rate_hz: float) -> list[int]:
-    """Return the numbers of block rows to try, from the fewest that the states need to the most that the lines can resolve."""
     lines, outputs, inputs = responses.value.shape
     z = np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz)
     fewest = -(-states // outputs) + 1
@@ -104,14 +103,7 @@ def with_independent_states(model: PnlssModel, experiments: Sequence[Experiment]
     gramian = root.T @ _observability(model, experiments) @ root
     root = root @ np.linalg.eigh(0.5 * (gramian + gramian.T))[1][:, ::-1]
     inverse = np.linalg.inv(root)
-    return PnlssModel.linear(
-        StateSpace(inverse @ model.a @ root, inverse @ model.b, model.c @ root, np.array(model.d)),
-        sample_rate_hz=model.sample_rate_hz,
-        inputs=model.inputs,
-        outputs=model.outputs,
-        specimen=model.specimen,
-        notes=model.notes,
-    )
+    return replace(model, a=inverse @ model.a @ root, b=inverse @ model.b, c=model.c @ root)
 
 
 def hardly_seen_states(model: PnlssModel, experiments: Sequence[Experiment]) -> int:
@@ -186,7 +178,6 @@ def linear_pnlss(
 
 
 def _without_periods(experiments: Sequence[Experiment], band_hz: tuple[float, float] | None) -> FrequencyResponseMatrix:
-    """Return the frequency responses of experiments none of which is periodic."""
     first = experiments[0]
     return regressed_responses(
         [(e.inputs[:, e.counted_from :], e.counted_outputs) for e in experiments],
@@ -206,7 +197,6 @@ def varying_inputs(experiments: Sequence[Experiment]) -> list[int]:
 
 
 def _given(linear: StateSpace | PnlssModel, first: Experiment, states: int) -> PnlssModel:
-    """Return a linear model given by the user, after checks."""
     matrices = linear.linear_part if isinstance(linear, PnlssModel) else linear
     n, m, outputs = states, len(first.input_channels), len(first.output_channels)
     for name, part, shape in zip("abcd", matrices, ((n, n), (n, m), (outputs, n), (outputs, m)), strict=True):

@@ -76,6 +76,9 @@ def realisation_combinations(
     and after every R models the selecting realisation advances by one. The first R models leave out different realisations,
     and all ``R (R - 1)`` models differ.
 
+    Raises `IdentificationError` if there are fewer than three realisations, none to fit, more models than combinations, a
+    level called ``mixed``, no level or no model.
+
     Parameters
     ----------
     levels
@@ -91,12 +94,6 @@ def realisation_combinations(
         Further experiments to which every model is fitted, such as backbone segments, and further ones that help to select
         its iterate. Without the latter, realisations of a low level would select an iterate regardless of high-level
         segments.
-
-    Raises
-    ------
-    IdentificationError
-        If there are fewer than three realisations, none to fit, more models than combinations, a level called ``mixed``, no
-        level or no model.
     """
     if most is not None and most < 1:
         raise IdentificationError(field="most", value=most, allowed="1 and above, or None for all realisations")
@@ -133,7 +130,6 @@ def realisation_combinations(
 
 
 def _job(training_set: str, members: Mapping[str, Sequence[Experiment]], k: int, most: int | None) -> ModelJob:
-    """Return the job of combination k of the realisations of every level."""
     training: list[Experiment] = []
     validation: list[Experiment] = []
     left_out: list[Experiment] = []

@@ -42,6 +42,8 @@ def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Non
 class PnlssModel(Result):
     """A nonlinear state-space model, in the units of its channels.
 
+    Raises `IdentificationError` if the matrices have NaN or infinite entries, or shapes do not agree.
+
     Parameters
     ----------
     a, b, e
@@ -64,11 +66,6 @@ class PnlssModel(Result):
         Name of the test specimen.
     notes
         Remarks on the model, one line each.
-
-    Raises
-    ------
-    IdentificationError
-        If the matrices have NaN or infinite entries, or shapes do not agree.
     """
 
     a: Float

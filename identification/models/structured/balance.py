@@ -16,7 +16,7 @@ from identification.harmonic_balance.basis import Basis, complex_product
 from identification.harmonic_balance.driven import DrivenBalance, Period
 from identification.harmonic_balance.drives import Drive
 from identification.harmonic_balance.stability import by_centroid, distinct
-from identification.models.structured.kernels import damping_at, slide, spring_at
+from identification.models.structured.kernels import damping_at, jenkins_step, spring_at
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.steps import System
 from vibrolock.arrays import Complex, Float
@@ -97,7 +97,6 @@ class StructuredBalance(DrivenBalance):
         return Period(outputs, residual, outputs_by, residual_by, to_hz * outputs_by_w, to_hz * by_w)
 
     def _elements(self, states: Float, w: float) -> tuple[Float, Float, Float]:
-        """Forces and damping of the elements, and derivatives of the forces, as `along_period`."""
         along = states @ self._system.phi.T
         x, rate = (np.ascontiguousarray((to @ along).T) for to in (self.basis.to_time, w * self._to_rate))
         along_period(self._system, x, rate, self.basis.to_time, w * self._to_rate, *self._work)
@@ -193,7 +192,7 @@ def add_slider(
     r, last, slipped = 0.0, 0.0, -1
     for repeat in range(2):
         for k in range(x.size):
-            _, r, _, sticking = slide(r, stiffness, strength, x[k] - last)
+            _, r, _, sticking = jenkins_step(r, stiffness, strength, x[k] - last)
             last = x[k]
             if sticking < 1.0:
                 slipped = k

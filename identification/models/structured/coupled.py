@@ -23,9 +23,9 @@ from identification.exciter_coupling.kernels import (
 )
 from identification.exciter_coupling.passes import DrivePoint, Passes, drive_point
 from identification.linear.subspace import StateSpace
-from identification.models.structured.model import Motion, StructuredModel, motion_of, room_for
+from identification.models.structured.model import Motion, StructuredModel, motion_of, workspace_for
 from identification.models.structured.nudging import ends_of_steps
-from identification.models.structured.steps import Room, System, accelerate, along, end_step, take_input, take_step
+from identification.models.structured.steps import System, Workspace, accelerate, dot, end_step, take_input, take_step
 from identification.validation import finite_array
 from vibrolock.arrays import Float
 from vibrolock.compiled import inner_kernel, unlocked_kernel
@@ -55,19 +55,19 @@ def coupled_run(
     states, u, motion = np.empty((count, 3, len(model.omega))), np.empty((count, 1)), np.empty(count)
     shape = np.append(model.output_shapes[at.output], model.direct[at.output, at.row])
     xi, after = np.empty(loop.b.size), np.empty(loop.b.size)
-    state, before, room = np.empty(system.size), np.empty(system.size), room_for(system)
+    state, before, work = np.empty(system.size), np.empty(system.size), workspace_for(system)
     gain = float(linear.d[at.output, at.row])
 
     def simulate(given: Float) -> int:
         return int(
-            run_coupled(system, room, loop, gain, at.order, shape, given, xi, after, state, before, states, u, motion)
+            run_coupled(system, work, loop, gain, at.order, shape, given, xi, after, state, before, states, u, motion)
         )
 
     reached, repeats, change = passes.run(simulate, u[:, 0], motion)
     states, force = states[: passes.n : model.steps], u[: passes.n : model.steps, 0]
     valid = -(-reached // model.steps)
     states[valid:], force[valid:] = np.nan, np.nan
-    found = motion_of(model, force[None], states, int(room.unsolved[0]))
+    found = motion_of(model, force[None], states, int(work.unsolved[0]))
     notes = (*coarser, *passes.notes(reached, repeats, change))
     with_exciter = {"force_n": force, "passes": repeats, "change": change, "notes": notes}
     return CoupledMotion(**(vars(found) | with_exciter))
@@ -120,24 +120,31 @@ def copy(values: np.ndarray, out: np.ndarray) -> None:
 
 @inner_kernel
 def drive_output(
-    system: System, room: Room, u: np.ndarray, k: int, state: np.ndarray, out: np.ndarray, row: np.ndarray, order: int
+    system: System,
+    work: Workspace,
+    u: np.ndarray,
+    k: int,
+    state: np.ndarray,
+    out: np.ndarray,
+    row: np.ndarray,
+    order: int,
 ) -> float:
     """Write displacement, velocity and acceleration [3, n] under the force ``u[k]``; return the output at the drive point.
 
     ``row``: shapes of the output, and its direct part.
     """
     n = system.omega.size
-    take_input(system, room, u, k, k, state[2 * n])
-    accelerate(system, room, state[:n], state[n : 2 * n], state[2 * n + 1 :], out[2])
+    take_input(system, work, u, k, k, state[2 * n])
+    accelerate(system, work, state[:n], state[n : 2 * n], state[2 * n + 1 :], out[2])
     for i in range(n):
         out[0, i], out[1, i] = state[i], state[n + i]
-    return along(out[order], row[:n]) + float(row[n]) * float(u[k, 0])
+    return dot(out[order], row[:n]) + float(row[n]) * float(u[k, 0])
 
 
 @unlocked_kernel
 def run_coupled(
     system: System,
-    room: Room,
+    work: Workspace,
     loop: Loop,
     gain: float,
     order: int,
@@ -160,7 +167,7 @@ def run_coupled(
     """
     n, count = system.omega.size, given.size
     largest = largest_of(given)
-    state[:], xi[:], room.unsolved[0] = 0.0, 0.0, 0
+    state[:], xi[:], work.unsolved[0] = 0.0, 0.0, 0
     new = 0.0
     for k in range(count):
         free = free_force(loop, xi, given[k])
@@ -170,10 +177,10 @@ def run_coupled(
             u[k, 0] = new
             copy(before, state)
             if k > 0:
-                take_input(system, room, u, k - 1, k, state[2 * n])
-                take_step(system, room, state[:n], state[n : 2 * n], state[2 * n + 1 :])
-                end_step(system, room, state[:n], state[n : 2 * n], state)
-            motion[k] = drive_output(system, room, u, k, state, states[k], row, order)
+                take_input(system, work, u, k - 1, k, state[2 * n])
+                take_step(system, work, state[:n], state[n : 2 * n], state[2 * n + 1 :])
+                end_step(system, work, state[:n], state[n : 2 * n], state)
+            motion[k] = drive_output(system, work, u, k, state, states[k], row, order)
             left = new - free - loop.d * motion[k]
             if abs(left) <= EXACT * (abs(new) + largest):
                 found = True

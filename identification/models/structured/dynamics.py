@@ -14,9 +14,8 @@ from identification.models.balanced_model import BalancedModel
 from identification.models.dynamic_model import Limit, SteadyRequest
 from identification.models.structured.balance import StructuredBalance
 from identification.models.structured.coupled import coupled_run
-from identification.models.structured.fit import StructuredFit
+from identification.models.structured.fit import StructuredFit, drawn
 from identification.models.structured.model import Motion, StructuredModel
-from identification.models.structured.uncertainty import drawn
 from vibrolock.arrays import Complex, Float
 
 _SAMPLES = 32

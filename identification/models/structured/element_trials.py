@@ -22,6 +22,8 @@ _LEAST_GAIN = 1.05
 class ElementPlan:
     """An element to be fitted.
 
+    Raises `IdentificationError` if there are no laws, or more than two channels.
+
     Parameters
     ----------
     laws
@@ -29,11 +31,6 @@ class ElementPlan:
     between
         Names of output channels: one for the displacement there, two for that of the first relative to the second. Empty: the
         direction is found.
-
-    Raises
-    ------
-    IdentificationError
-        If there are no laws, or more than two channels.
     """
 
     laws: tuple[Law, ...] = (PolynomialSpring(), PolynomialDamper())

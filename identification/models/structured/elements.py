@@ -29,6 +29,9 @@ class NonlinearElement:
     add up (`laws`). Beyond ``|x| = reach`` dampers stay constant, and springs go on as straight lines
     with the mean slope of both ends, within limits that `StructuredModel` states.
 
+    Raises `IdentificationError` if a number is not finite, a damping is below zero, there is no law, or scale or reach are not
+    above zero.
+
     Parameters
     ----------
     direction
@@ -43,11 +46,6 @@ class NonlinearElement:
         Largest ``|x|`` in the training data; None if unknown.
     between
         Outputs between which, or at which, the element acts; empty if its direction was found.
-
-    Raises
-    ------
-    IdentificationError
-        If a number is not finite, a damping is below zero, there is no law, or scale or reach are not above zero.
     """
 
     direction: Float
@@ -132,7 +130,7 @@ class Tables(NamedTuple):
     """int[n_elements + 1]: first slider of every element."""
 
 
-class Changes(NamedTuple):
+class DerivativeTables(NamedTuple):
     """Derivatives of `Tables` by the numbers of the laws: first those of all springs, then of dampers, then of joints."""
 
     element: np.ndarray
@@ -169,7 +167,6 @@ def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Fl
 
 
 def _end_slope(element: NonlinearElement, table: Float) -> float:
-    """Mean slope of a spring at both ends of its table."""
     return float(np.mean(table[1, [0, -1]]) * (NODES - 1) / (2.0 * element.reach))
 
 
@@ -184,7 +181,7 @@ def laws_in_order(elements: Sequence[NonlinearElement]) -> list[tuple[int, int]]
     ]
 
 
-def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
+def derivative_tables_of(elements: Sequence[NonlinearElement], tables: Tables) -> DerivativeTables:
     """Return the derivatives of `tables_of` by the numbers of the laws."""
     owner, springs, limits, dampers, sliders = [], [], [], [], []
     for e, number in laws_in_order(elements):
@@ -211,7 +208,7 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
                 sliders.append(change)
     by_slider = np.array(sliders).reshape(len(sliders), len(tables.sliders), 2)
     changed = np.any(by_slider != 0.0, axis=2)
-    return Changes(
+    return DerivativeTables(
         element=np.array(owner, dtype=np.int64),
         springs=np.array(springs).reshape(-1, 3, NODES),
         limits=np.array(limits).reshape(-1, 3),

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -11,14 +11,14 @@ import numpy as np
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band, same_channels
-from identification.fitting.result import Ending, FitResult
+from identification.fitting.levenberg_marquardt import Minimum
+from identification.fitting.result import FitResult
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan, ElementTrial
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
-from identification.models.structured.modal_motion import prolonged, settling_periods
 from identification.models.structured.model import StructuredModel
-from identification.models.structured.nudging import Nudging
+from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
 from identification.models.structured.parameters import HIGHEST, Parameters
 from identification.models.structured.problem import ModalTest, Problem
 from identification.models.structured.start import linear_start, with_element, with_further_element
@@ -46,7 +46,9 @@ _LEAST, _PER_PERIOD = 2, 100.0
 _LARGEST_STATIC = 10.0
 """Largest static force relative to the largest RMS of the training forces."""
 _SUPPORT = 0.01
-"""Initial stiffness of the support relative to the first mode's at the drive point."""
+"""Initial stiffness of the support relative to the first mode's at the drive point. Chosen."""
+_SHARE = 0.1
+"""Steps of central differences relative to the standard errors of the numbers. Chosen."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -105,6 +107,9 @@ def fit_structured(
     Derivatives of one experiment per thread are held at once: some 32 bytes for each counted sample, output and free number,
     15 MB for 8000 samples with three outputs.
 
+    Raises `IdentificationError` if experiments differ in channels or rate, have no force, do not match the modes, or do not
+    begin at rest.
+
     Parameters
     ----------
     modes
@@ -128,11 +133,6 @@ def fit_structured(
     steps
         Steps in a sample; None for a hundred in a period of the highest excited frequency, two in a sample at least. Errors of
         the simulation fall with their square: with 23 in a period they were 1.3 % of a response of the magnet beam.
-
-    Raises
-    ------
-    IdentificationError
-        If experiments differ in channels or rate, have no force, do not match the modes, or do not begin at rest.
     """
     began = time.perf_counter()
     same_channels(experiments)
@@ -154,7 +154,7 @@ def fit_structured(
     wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
     linear = linear_start(modes, first, steps)
     linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
-    led = min(len(modes.frequency_hz), len(first.outputs))  # modes whose motion the outputs tell apart
+    nudged = min(len(modes.frequency_hz), len(first.outputs))  # modes whose motion the outputs tell apart
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
     known = 0.0 if isinstance(support, bool) else float(support)
     if not 0.0 <= known < math.inf:
@@ -163,11 +163,11 @@ def fit_structured(
     kept: _Fitted | None = None
     for plan in wanted:
         if found.elements or plan.between:
-            start = with_further_element(found, experiments, led, plan, reach)
+            start = with_further_element(found, experiments, nudged, plan, reach)
         else:
             with threads():  # its matrices are too small to share
-                start = with_element(found, experiments, led, plan.laws, reach)
-        fitted = _fitted(start, linear, modes, experiments, led, support is True)
+                start = with_element(found, experiments, nudged, plan.laws, reach)
+        fitted = _fitted(start, linear, modes, experiments, nudged, support is True)
         evaluations, iterations = evaluations + fitted.evaluations, iterations + fitted.iterations
         trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
         trials.append(trial)
@@ -179,26 +179,23 @@ def fit_structured(
         model=kept.model.trained_with(experiments),
         start=kept.start,
         names=kept.problem.parameters.names,
-        values=kept.vector,
-        covariance=kept.problem.covariance(kept.vector),
-        training_error=kept.problem.error(kept.vector),
+        values=kept.last.vector,
+        covariance=kept.problem.covariance(kept.last.vector),
+        training_error=kept.problem.error(kept.last.vector),
         evaluations=evaluations,
         iterations=iterations,
         seconds=time.perf_counter() - began,
-        status=kept.ending.status,
-        message=kept.ending.message,
+        status=kept.last.ending.status,
+        message=kept.last.ending.message,
         trials=tuple(trials),
     )
 
 
 class _Fitted(NamedTuple):
-    """A model with given elements, fitted."""
-
     model: StructuredModel
     start: StructuredModel
     problem: Problem
-    vector: Float
-    ending: Ending
+    last: Minimum
     evaluations: int
     iterations: int
 
@@ -208,7 +205,7 @@ def _fitted(
     linear: StructuredModel,
     modes: LinearModes,
     experiments: Sequence[Experiment],
-    led: int,
+    nudged: int,
     support: bool,
 ) -> _Fitted:
     """Fit all numbers, in stages with smaller and smaller nudging forces."""
@@ -220,16 +217,16 @@ def _fitted(
     # fits before the last one take half of the steps, as long as every mode may rise by a fifth
     needed = 1.2 * float(np.max(start.frequency_hz)) / (HIGHEST * start.sample_rate_hz)
     rough = min(start.steps, max(math.ceil(0.5 * start.steps), math.ceil(needed)))
-    slowest = float(np.min((linear.omega * linear.damping_ratio)[:led]))
+    slowest = float(np.min((linear.omega * linear.damping_ratio)[:nudged]))
     for ratio, free, turned in _STAGES[support]:
         if free and not found.support_n_m:
             found = replace(found, support_n_m=stiffness)
         # the last fit runs without nudging for so long before it counts that its effect has decayed
         lengths = [0 if ratio or not e.period_samples else settling_periods(e, slowest) for e in experiments]
-        settled = [prolonged(e, count) for e, count in zip(experiments, lengths, strict=True)]
+        settled = [with_lead_in_periods(e, count) for e, count in zip(experiments, lengths, strict=True)]
         begun = start if turned else replace(start, steps=rough)
         nudgings = [
-            Nudging.of(linear, e, led, ratio, begun.steps, e.counted_from - count * e.period_samples)
+            Nudging.of(linear, e, nudged, ratio, begun.steps, e.counted_from - count * e.period_samples)
             if e.period_samples
             else None
             for e, count in zip(settled, lengths, strict=True)
@@ -240,4 +237,44 @@ def _fitted(
         found = parameters.model(end.vector)
         evaluations, iterations = evaluations + end.evaluations, iterations + end.iterations
         misfit = min(_MISFIT, problem.error(end.vector))
-    return _Fitted(found, start, problem, end.vector, end.ending, evaluations, iterations)
+    return _Fitted(found, start, problem, end, evaluations, iterations)
+
+
+def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> Float:
+    """Return standard errors of what a function computes of a model, float[k], by central differences along the free numbers.
+
+    Linear in the errors, and as certain as `StructuredFit.covariance`. The steps follow the principal axes of the covariance,
+    so that what the data do not tell apart moves together.
+    """
+    parameters, parts = _parameters_of(fit), []
+    for axis in _axes_of(fit):
+        step = _SHARE * axis
+        more, less = (quantity(parameters.model(fit.values + sign * step)) for sign in (1.0, -1.0))
+        parts.append((more - less) / (2.0 * _SHARE))
+    return np.asarray(np.linalg.norm(parts, axis=0))
+
+
+def drawn(fit: StructuredFit, count: int, seed: int = 0) -> Iterator[StructuredModel]:
+    """Yield ``count`` models whose free numbers are drawn about those of a fit, from a normal distribution with its covariance.
+
+    Numbers that leave the bounds of a fit are set to them.
+    """
+    parameters, axes, random = _parameters_of(fit), _axes_of(fit), np.random.default_rng(seed)
+    bounds = parameters.bounds(fit.values)
+    for _ in range(count):
+        yield parameters.model(np.clip(fit.values + random.standard_normal(len(axes)) @ axes, *bounds))
+
+
+def _parameters_of(fit: StructuredFit) -> Parameters:
+    drive = find_role(fit.start.outputs, "drive")
+    poles = sum(name.startswith("frequency ") for name in fit.names)
+    return Parameters(fit.start, (drive,), "support" in fit.names, poles=poles)
+
+
+def _axes_of(fit: StructuredFit) -> Float:
+    """float[k, P]: principal axes of the covariance, each as long as its standard error."""
+    size = np.sqrt(np.diag(fit.covariance))
+    unit = np.where(size > 0.0, size, 1.0)
+    values, axes = np.linalg.eigh(fit.covariance / np.outer(unit, unit))
+    kept = values > 0.0
+    return np.asarray((axes[:, kept] * np.sqrt(values[kept])).T * size)

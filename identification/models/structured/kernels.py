@@ -50,7 +50,7 @@ def damping_at(x: float, row: np.ndarray, reach: float) -> tuple[float, float]:
 
 
 @inner_kernel
-def slide(r: float, stiffness: float, strength: float, way: float) -> tuple[float, float, float, float]:
+def jenkins_step(r: float, stiffness: float, strength: float, way: float) -> tuple[float, float, float, float]:
     """Move a slider with the force ``r`` along ``way`` at constant speed.
 
     Return mean force, force at the end, and the derivatives of the mean by ``way`` and by ``r``. The slider sticks if the last
@@ -91,13 +91,13 @@ def step_force(
 
 
 @unlocked_kernel
-def slide_along(sliders: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
+def jenkins_forces(sliders: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
     """Write the force of sliders [n, 2] in the second of two periods with the displacement ``x``."""
     for s in range(sliders.shape[0]):
         r, last = 0.0, x[x.size - 1]
         for repeat in range(2):
             for k in range(x.size):
-                r = slide(r, sliders[s, 0], sliders[s, 1], x[k] - last)[1]
+                r = jenkins_step(r, sliders[s, 0], sliders[s, 1], x[k] - last)[1]
                 last = x[k]
                 if repeat == 1:
                     out[k] += r

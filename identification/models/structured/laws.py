@@ -25,7 +25,7 @@ _MAGNET_REACH = 0.8
 """Share of a magnet's gap beyond which its force goes on as a straight line."""
 
 
-class Way(NamedTuple):
+class Transform(NamedTuple):
     """How a fit moves a number: to a number without limits, and back."""
 
     to: Callable[[Float], Float]
@@ -37,9 +37,9 @@ class Way(NamedTuple):
     """Largest distance of what the fit moves from its initial value."""
 
 
-def _between(low: float, high: float) -> Way:
+def _between(low: float, high: float) -> Transform:
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    return Way(
+    return Transform(
         lambda y: np.arctanh((y - middle) / half),
         lambda v: middle + half * np.tanh(np.clip(v, -8.0, 8.0)),
         f"between {low:g} and {high:g}",
@@ -47,9 +47,9 @@ def _between(low: float, high: float) -> Way:
     )
 
 
-PLAIN = Way(lambda y: y, lambda v: v, "finite numbers")
-POSITIVE = Way(np.log, lambda v: np.exp(np.clip(v, -60.0, 60.0)), "numbers above 0", span=np.log(1e3))
-FROM_ZERO = Way(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v, 0.0), "numbers from 0", 1e-12)
+PLAIN = Transform(lambda y: y, lambda v: v, "finite numbers")
+POSITIVE = Transform(np.log, lambda v: np.exp(np.clip(v, -60.0, 60.0)), "numbers above 0", span=np.log(1e3))
+FROM_ZERO = Transform(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v, 0.0), "numbers from 0", 1e-12)
 """A fit goes down to 1e-12: at 0 itself the derivatives by a slider would be those of one that never slips."""
 
 
@@ -60,7 +60,7 @@ class Law:
 
     kind: ClassVar[str]
     """Name of the law in files and commands."""
-    free: ClassVar[Mapping[str, Way]]
+    free: ClassVar[Mapping[str, Transform]]
     """Numbers that a fit moves, and how."""
     linear: ClassVar[str] = ""
     """Those in which the law is linear. A regression finds their initial values."""
@@ -68,12 +68,12 @@ class Law:
     """Values of other numbers that the regression tries."""
 
     def __post_init__(self) -> None:
-        for name, way in self.free.items():
+        for name, transform in self.free.items():
             values = np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64))
             with np.errstate(all="ignore"):
-                allowed = np.all(np.isfinite(way.to(values)))
+                allowed = np.all(np.isfinite(transform.to(values)))
             if not allowed:
-                raise IdentificationError(f"{name} is {values.tolist()}", field=self.kind, allowed=way.allowed)
+                raise IdentificationError(f"{name} is {values.tolist()}", field=self.kind, allowed=transform.allowed)
             if isinstance(getattr(self, name), (list, np.ndarray)):
                 object.__setattr__(self, name, tuple(values.tolist()))
 
@@ -83,11 +83,8 @@ class Law:
         out: list[str] = []
         for name in self.free:
             value = getattr(self, name)
-            out += (
-                [f"{self.kind} {name}[{k}]" for k in range(len(value))]
-                if isinstance(value, tuple)
-                else [f"{self.kind} {name}"]
-            )
+            ends = [f"[{k}]" for k in range(len(value))] if isinstance(value, tuple) else [""]
+            out += [f"{self.kind} {name}{end}" for end in ends]
         return tuple(out)
 
     @property
@@ -103,31 +100,35 @@ class Law:
     @property
     def vector(self) -> Float:
         """float[P], the numbers as a fit moves them."""
-        parts = [way.to(np.atleast_1d(np.asarray(getattr(self, name), float))) for name, way in self.free.items()]
+        parts = [
+            transform.to(np.atleast_1d(np.asarray(getattr(self, name), float))) for name, transform in self.free.items()
+        ]
         return np.concatenate(parts)
 
     @property
     def bounds(self) -> Float:
         """float[2, P], least and largest values of `vector` in a fit that begins at these numbers."""
         sizes = [np.size(getattr(self, name)) for name in self.free]
-        least, span = (np.repeat([getattr(way, of) for way in self.free.values()], sizes) for of in ("least", "span"))
+        least, span = (
+            np.repeat([getattr(transform, of) for transform in self.free.values()], sizes) for of in ("least", "span")
+        )
         return np.array([np.maximum(self.vector - span, least), self.vector + span])
 
     def moved(self, vector: Float) -> Self:
         """Invert `vector`."""
         at, changes = 0, {}
-        for name, way in self.free.items():
+        for name, transform in self.free.items():
             value = getattr(self, name)
             count = len(value) if isinstance(value, tuple) else 1
-            found = way.back(np.asarray(vector[at : at + count], dtype=np.float64))
+            found = transform.back(np.asarray(vector[at : at + count], dtype=np.float64))
             changes[name] = tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])
             at += count
         return replace(self, **changes)
 
     def candidates(self) -> list[Self]:
         """Return the law with all combinations of the numbers that a regression tries."""
-        ways = [[(name, value) for value in values] for name, values in self.tried.items()]
-        return [replace(self, **dict(way)) for way in product(*ways)]
+        choices = [[(name, value) for value in values] for name, values in self.tried.items()]
+        return [replace(self, **dict(choice)) for choice in product(*choices)]
 
     def basis(self) -> list[Self]:
         """Return the law with one of its linear numbers at 1 and the others at 0, for each; none without such numbers."""

@@ -8,15 +8,14 @@ import numpy as np
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
-from identification.harmonic_balance.backbone import Resonances
+from identification.harmonic_balance.paths import Resonances
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import motion_rows
 from identification.models.dynamic_model import HARMONICS, SteadyRequest
 from identification.models.structured.balance import StructuredBalance
 from identification.models.structured.dynamics import StructuredDynamics
-from identification.models.structured.fit import StructuredFit
+from identification.models.structured.fit import StructuredFit, std_of
 from identification.models.structured.model import StructuredModel
-from identification.models.structured.uncertainty import std_of
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.nonlinear.properties import States, properties
 from vibrolock.arrays import Float
@@ -52,6 +51,9 @@ def structured_mode(
     (`uncertainty`). They are NaN for a model without its fit, and contain neither the misfit of the
     laws nor that of the modes.
 
+    Raises `IdentificationError` if ``force_n`` is needed because the model does not know its training data, and as
+    `identification.backbone` does.
+
     Parameters
     ----------
     found
@@ -62,11 +64,6 @@ def structured_mode(
         As in `identification.backbone`.
     support
         Whether the model's static support acts, as it does in a measured backbone.
-
-    Raises
-    ------
-    IdentificationError
-        If ``force_n`` is needed because the model does not know its training data, and as `identification.backbone` does.
     """
     model = found.model if isinstance(found, StructuredFit) else found
     row = find_role(model.outputs, "drive")

@@ -11,10 +11,15 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulation import Simulation, first_unbounded, use_of
 from identification.models.structured.elements import NonlinearElement, small_vibrations, tables_of
-from identification.models.structured.modal_motion import prolonged, settling_periods
-from identification.models.structured.nudging import Nudging, ends_of_steps, renew
-from identification.models.structured.steps import Room, System, run
-from identification.validation import finite_array, positive
+from identification.models.structured.nudging import (
+    Nudging,
+    ends_of_steps,
+    settling_periods,
+    update_support,
+    with_lead_in_periods,
+)
+from identification.models.structured.steps import System, Workspace, run
+from identification.validation import finite_array, positive, shaped_array
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
@@ -27,20 +32,14 @@ class Motion(Simulation):
     """A simulated run of a structured model; its states are the modal displacements, and then the velocities.
 
     Of a periodic experiment only the samples that count are in the uses of elements, not the transient that leads to them.
-
-    Parameters
-    ----------
-    acceleration
-        float[n_modes, n], second derivatives of the modal coordinates by time, kg^1/2 m/s^2.
-    reach_use
-        float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated.
-    unsolved_steps
-        Number of steps whose equation Newton's iteration has not solved; above 0 energy balance and bound do not hold.
     """
 
     acceleration: Float
+    """float[n_modes, n], second derivatives of the modal coordinates by time, kg^1/2 m/s^2."""
     reach_use: Float
+    """float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated."""
     unsolved_steps: int = 0
+    """Number of steps whose equation Newton's iteration has not solved; above 0 energy balance and bound do not hold."""
 
     @property
     def displacement(self) -> Float:
@@ -72,6 +71,8 @@ class StructuredModel(Result):
 
     Not modelled: damping that couples modes, inputs between samples above half the rate.
 
+    Raises `IdentificationError` if shapes do not agree, or a number is not allowed.
+
     Parameters
     ----------
     frequency_hz, damping_ratio
@@ -96,11 +97,6 @@ class StructuredModel(Result):
         Name of the test specimen.
     training
         Names of the training experiments.
-
-    Raises
-    ------
-    IdentificationError
-        If shapes do not agree, or a number is not allowed.
     """
 
     frequency_hz: Float
@@ -120,27 +116,20 @@ class StructuredModel(Result):
     training: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, dimensions in (
-            ("frequency_hz", 1),
-            ("damping_ratio", 1),
-            ("input_shapes", 2),
-            ("output_shapes", 2),
-            ("direct", 2),
-        ):
-            object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, dimensions))
         for name in ("elements", "inputs", "outputs", "training"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         for name in ("sample_rate_hz", "support_corner_hz", "support_largest_n"):
             object.__setattr__(self, name, positive(name, getattr(self, name)))
-        modes, inputs, outputs = len(self.frequency_hz), len(self.inputs), len(self.outputs)
-        for name, needed in (
-            ("damping_ratio", (modes,)),
-            ("input_shapes", (modes, inputs)),
-            ("output_shapes", (outputs, modes)),
-            ("direct", (outputs, inputs)),
-        ):
-            if getattr(self, name).shape != needed:
-                raise IdentificationError(f"shape {getattr(self, name).shape}", field=name, allowed=needed)
+        modes, inputs, outputs = np.size(self.frequency_hz), len(self.inputs), len(self.outputs)
+        shapes: dict[str, tuple[int, ...]] = {
+            "frequency_hz": (modes,),
+            "damping_ratio": (modes,),
+            "input_shapes": (modes, inputs),
+            "output_shapes": (outputs, modes),
+            "direct": (outputs, inputs),
+        }
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, shaped_array(name, getattr(self, name), np.float64, shape))
         for name in ("frequency_hz", "damping_ratio"):
             if not np.all(getattr(self, name) > 0.0):
                 raise IdentificationError(
@@ -162,10 +151,9 @@ class StructuredModel(Result):
                 raise IdentificationError(
                     f"shape {element.direction.shape}", field=f"elements[{number}].direction", allowed=f"{(modes,)}"
                 )
-        if self.steps < 1 or self.support_n_m < 0.0:
-            name = "steps" if self.steps < 1 else "support_n_m"
-            least = 1 if self.steps < 1 else 0
-            raise IdentificationError(field=name, value=getattr(self, name), allowed=f"{least} or above")
+        for name, least in (("steps", 1), ("support_n_m", 0)):
+            if getattr(self, name) < least:
+                raise IdentificationError(field=name, value=getattr(self, name), allowed=f"{least} or above")
 
     @property
     def omega(self) -> Float:
@@ -210,15 +198,15 @@ class StructuredModel(Result):
         return self.run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
 
     def run(self, stretches: Sequence[tuple[System, int, int]], u: Float, ends: Float, counted_from: int = 0) -> Motion:
-        """Simulate from rest, with a system from sample to sample; a support that is held is renewed after each stretch."""
+        """Simulate from rest, with a system from sample to sample; a frozen support is updated after each stretch."""
         states, state = np.zeros((u.shape[1], 3, len(self.omega))), np.zeros(self.system.size)
         unsolved = 0
         for part, first, last in stretches:
-            room = room_for(part)
-            run(part, room, ends[first * self.steps : last * self.steps + 1], state, states[first:last])
-            unsolved += int(room.unsolved[0])
+            work = workspace_for(part)
+            run(part, work, ends[first * self.steps : last * self.steps + 1], state, states[first:last])
+            unsolved += int(work.unsolved[0])
             if not part.support[1]:
-                renew(part, (last - first) / self.sample_rate_hz, state)
+                update_support(part, (last - first) / self.sample_rate_hz, state)
         return motion_of(self, u, states, unsolved, counted_from)
 
     def simulate_experiment(self, experiment: Experiment) -> Motion:
@@ -230,16 +218,16 @@ class StructuredModel(Result):
         """
         if not experiment.period_samples:
             return self.simulate(experiment.inputs)
-        told = min(len(self.omega), len(self.outputs))
-        added = settling_periods(experiment, float(np.min((self.omega * self.damping_ratio)[:told])))
-        longer, until = prolonged(experiment, added), experiment.counted_from
-        nudging = Nudging.of(self, longer, told, 0.0, self.steps, until)
+        n_observable = min(len(self.omega), len(self.outputs))
+        added = settling_periods(experiment, float(np.min((self.omega * self.damping_ratio)[:n_observable])))
+        longer, until = with_lead_in_periods(experiment, added), experiment.counted_from
+        nudging = Nudging.of(self, longer, n_observable, 0.0, self.steps, until)
         run_of = self.run(nudging.stretches(self.system), longer.inputs, nudging.ends, longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         cut = {name: getattr(run_of, name)[:, kept] for name in ("outputs", "states", "acceleration")}
         return replace(run_of, **cut, unbounded_at=first_unbounded(cut["outputs"]))
 
-    def place_of(self, between: Sequence[str]) -> Float:
+    def output_selector(self, between: Sequence[str]) -> Float:
         """float[n_outputs]: the displacement at an output, or of one relative to another, as a sum of those of all outputs.
 
         Raises `IdentificationError` if a channel is not among the outputs.
@@ -255,11 +243,6 @@ class StructuredModel(Result):
         Springs have their slope at rest, and all sliders stick. Frequencies and damping ratios are those of the poles, shapes
         those without damping. Not modelled: the damping that couples these modes, and what time steps do to the elements,
         which lowers the frequencies of a simulation by up to ``(pi f h)^2 / 3`` of themselves.
-
-        Raises
-        ------
-        IdentificationError
-            If a mode does not oscillate and fade at rest.
         """
         if not self.elements:
             return self
@@ -307,15 +290,15 @@ def motion_of(model: StructuredModel, u: Float, states: Float, unsolved: int, co
     )
 
 
-def room_for(system: System, columns: int = 0) -> Room:
-    """Return room for the steps of a system, and for derivatives by ``columns`` numbers."""
+def workspace_for(system: System, columns: int = 0) -> Workspace:
+    """Return work for the steps of a system, and for derivatives by ``columns`` numbers."""
     n, inputs, elements = len(system.omega), system.b.shape[1], len(system.phi)
     h, omega, phi = system.step_s, system.omega, system.phi
-    rigidity = 2.0 / h + 2.0 * system.zeta * omega + 0.5 * h * omega**2
-    return Room(
-        rigidity=rigidity,
-        yields=phi / rigidity,
-        shared=phi / rigidity @ phi.T,
+    effective_stiffness = 2.0 / h + 2.0 * system.zeta * omega + 0.5 * h * omega**2
+    return Workspace(
+        effective_stiffness=effective_stiffness,
+        compliance=phi / effective_stiffness,
+        shared=phi / effective_stiffness @ phi.T,
         mean=np.zeros(n),
         free=np.zeros(n),
         u=np.zeros(inputs),
@@ -324,7 +307,7 @@ def room_for(system: System, columns: int = 0) -> Room:
         coupling=np.zeros((elements, elements)),
         change=np.zeros((elements, 1)),
         row=np.zeros(columns),
-        pull=np.zeros(columns),
+        dforce=np.zeros(columns),
         stuck=np.zeros(len(system.tables.sliders)),
         unsolved=np.zeros(1, dtype=np.int64),
     )

@@ -11,15 +11,94 @@ one period contains no line, and is known at its end.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
+from identification.channels import MOTION_ORDER
 from identification.experiments.experiment import Experiment
-from identification.models.structured.modal_motion import Modal, measured_velocity
-from identification.models.structured.steps import System, led
-from vibrolock.arrays import Float
+from identification.models.structured.steps import System, nudged
+from vibrolock.arrays import Complex, Float
+
+LOWEST = 0.2
+"""Lines below this share of the first frequency are left out: sensors of acceleration do not show such motion."""
+
+_SETTLED, _LONGEST = 1e-2, 8
+"""Share of the led motion's error that is left when a simulation counts, and most periods that this may take."""
+
+
+class Modal(Protocol):
+    """What is needed of a model."""
+
+    @property
+    def omega(self) -> Float:
+        """float[n_modes], rad/s."""
+
+    @property
+    def input_shapes(self) -> Float:
+        """float[n_modes, n_inputs]."""
+
+    @property
+    def output_shapes(self) -> Float:
+        """float[n_outputs, n_modes]."""
+
+
+def modal_spectra(linear: Modal, experiment: Experiment, modes: int) -> tuple[Complex, Complex, Float]:
+    """Amplitudes (of the FFT over its length) of modal coordinates and input of the mean period, and frequencies in rad/s."""
+    n = experiment.period_samples
+    inputs, outputs = (
+        np.fft.rfft(values.reshape(len(values), -1, n).mean(axis=1), axis=1) / n
+        for values in (experiment.counted_inputs, experiment.counted_outputs)
+    )
+    omega = 2.0 * np.pi * np.fft.rfftfreq(n, 1.0 / experiment.sample_rate_hz)
+    moving = np.zeros_like(outputs)
+    moving[:, 1:] = [
+        row[1:] / (1j * omega[1:]) ** MOTION_ORDER[channel.motion]
+        for row, channel in zip(outputs, experiment.output_channels, strict=True)
+    ]
+    above = slice(modes, None)
+    residual = linear.output_shapes[:, above] @ (linear.input_shapes[above] / linear.omega[above, None] ** 2)
+    moving = moving - residual @ inputs
+    q = np.linalg.pinv(linear.output_shapes[:, :modes]) @ moving
+    q[:, omega < LOWEST * linear.omega[0]] = 0.0
+    return q, inputs, np.asarray(omega, dtype=np.float64)
+
+
+def measured_velocity(linear: Modal, experiment: Experiment, measured_modes: int) -> Float:
+    """float[n_modes, n]: modal velocities of a periodic experiment in all its samples; zero for modes that are not measured."""
+    q, _, omega = modal_spectra(linear, experiment, measured_modes)
+    n = experiment.period_samples
+    period = np.fft.irfft(1j * omega * q, n, axis=1) * n
+    samples = (np.arange(experiment.inputs.shape[1]) - experiment.counted_from) % n
+    velocity = np.zeros((len(linear.omega), samples.size))
+    velocity[:measured_modes] = period[:, samples]
+    return velocity
+
+
+def settling_periods(experiment: Experiment, rate: float) -> int:
+    """Periods in which a motion that decays with ``rate`` (rad/s) falls to `_SETTLED`."""
+    seconds = experiment.period_samples / experiment.sample_rate_hz
+    return min(int(np.ceil(np.log(1.0 / _SETTLED) / (rate * seconds))), _LONGEST)
+
+
+def with_lead_in_periods(experiment: Experiment, periods: int) -> Experiment:
+    """Return an experiment with more periods before those that count."""
+    if not periods:
+        return experiment
+    inputs, outputs = (
+        np.concatenate(
+            [values[:, : experiment.counted_from], np.tile(one, periods), values[:, experiment.counted_from :]], axis=1
+        )
+        for values, one in (
+            (experiment.inputs, experiment.counted_inputs[:, : experiment.period_samples]),
+            (experiment.outputs, experiment.counted_outputs[:, : experiment.period_samples]),
+        )
+    )
+    begins = experiment.counted_from + periods * experiment.period_samples
+    return replace(experiment, inputs=inputs, outputs=outputs, counted_from=begins)
+
 
 _RATIO = 0.05
 """Damping ratio of the nudging forces before the samples that count. Chosen."""
@@ -29,28 +108,19 @@ _WINDOW = ("kaiser", 8.0)
 
 @dataclass(frozen=True, eq=False)
 class Nudging:
-    """Forces that nudge the modes.
-
-    Parameters
-    ----------
-    before, rate
-        float[n_modes], rates up to sample ``until`` and from there on, rad/s; 0 for a mode that is not nudged.
-    signals
-        float[n_inputs + n_modes, n], inputs and measured modal velocities.
-    steps
-        Steps in a sample.
-    until
-        Number of samples that are nudged at the rate ``before``.
-    period
-        Samples of a period. Periods begin at ``until``.
-    """
+    """Forces that nudge the modes."""
 
     before: Float
     rate: Float
+    """float[n_modes], rates up to sample ``until`` and from there on, rad/s; 0 for a mode that is not nudged."""
     signals: Float
+    """float[n_inputs + n_modes, n], inputs and measured modal velocities."""
     steps: int
+    """Steps in a sample."""
     until: int
+    """Number of samples that are nudged at the rate ``before``."""
     period: int
+    """Samples of a period. Periods begin at ``until``."""
 
     @classmethod
     def of(cls, model: Modal, experiment: Experiment, measured: int, ratio: float, steps: int, until: int) -> "Nudging":
@@ -66,7 +136,7 @@ class Nudging:
 
     def stretches(self, system: System) -> list[tuple[System, int, int]]:
         """Return the system that is nudged, and first and last sample, of every period or part of one."""
-        systems = [held(led(system, self.before)), held(led(system, self.rate))]
+        systems = [frozen_support(nudged(system, self.before)), frozen_support(nudged(system, self.rate))]
         ends = zip(systems, (0, self.until), (self.until, self.signals.shape[1]), strict=True)
         return [(one, *at) for one, a, b in ends for at in periods_of(a, b, self.until, self.period)]
 
@@ -81,7 +151,7 @@ def not_led(derivatives: Float, system: System, rate: Float) -> Float:
     return np.asarray(own)
 
 
-def held(system: System) -> System:
+def frozen_support(system: System) -> System:
     """Return the system with a support whose force is held."""
     return system._replace(support=system.support * np.array([1.0, 0.0, 1.0]))
 
@@ -94,21 +164,15 @@ def periods_of(first: int, last: int, begin: int, period: int) -> Iterator[tuple
         first = end
 
 
-def renew(system: System, length_s: float, state: Float, sens: Float | None = None) -> None:
+def update_support(system: System, length_s: float, state: Float, sens: Float | None = None) -> None:
     """Hold the force at the mean displacement over the last ``length_s``, and begin with the next mean.
 
     The mean m was measured while the force was that of the displacement z. A linear structure at the mean z' would move by
     ``c k (z' - z)`` less, with the static compliance c at the input and the stiffness k of the support. So
     ``z' = (m + c k z)/(1 + c k)`` is the mean displacement with its own force; a nonlinear structure takes some periods.
 
-    Parameters
-    ----------
-    system
-        System with a support that is `held`.
-    length_s
-        Time since the last call.
-    state, sens
-        float[`System.size`], and its derivatives, float[`System.size`, P] (`run_with_sensitivities`); both are changed.
+    ``length_s``: time since the last call. ``state``, float[`System.size`], of a system with `frozen_support`, and its
+    derivatives ``sens``, float[`System.size`, P] (`run_with_sensitivities`), are changed.
     """
     n, inputs, stiffness = len(system.omega), system.inputs, float(system.support[0])
     b, omega = system.b[:, 0], system.omega

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.models.structured.elements import NonlinearElement, changes_of, laws_in_order
-from identification.models.structured.model import StructuredModel, outputs_of, room_for
-from identification.models.structured.nudging import Nudging, ends_of_steps, not_led, renew
+from identification.models.structured.elements import NonlinearElement, derivative_tables_of, laws_in_order
+from identification.models.structured.model import StructuredModel, outputs_of, workspace_for
+from identification.models.structured.nudging import Nudging, ends_of_steps, not_led, update_support
 from identification.models.structured.sensitivities import Sensitivities, run_with_sensitivities
 from identification.models.structured.steps import System
 from vibrolock.arrays import Float
@@ -27,27 +27,19 @@ class Parameters:
     Logarithms of frequencies and damping ratios of the first ``poles`` modes; input shapes; of each element the direction
     without its leading component (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move
     them; the support's stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
-
-    Parameters
-    ----------
-    start
-        Model that gives sizes and everything that is not free.
-    tied
-        Outputs at the first input: by reciprocity their shapes are the input's.
-    support
-        Whether the support is free.
-    turned
-        Whether directions are free.
-    poles
-        Number of modes whose frequency and damping ratio are free, the first ones; None for all. The data do not show those of
-        a mode that stands for all modes above the band: whatever its frequency is, its ringing leaves the same residual.
     """
 
     start: StructuredModel
+    """Model that gives sizes and everything that is not free."""
     tied: tuple[int, ...]
+    """Outputs at the first input: by reciprocity their shapes are the input's."""
     support: bool
+    """Whether the support is free."""
     turned: bool = True
+    """Whether directions are free."""
     poles: int | None = None
+    """Number of modes whose frequency and damping ratio are free, the first ones; None for all. The data do not show those of a
+    mode that stands for all modes above the band: whatever its frequency is, its ringing leaves the same residual."""
 
     @property
     def _poles(self) -> int:
@@ -142,7 +134,7 @@ class Parameters:
         elements = tuple(
             replace(
                 element,
-                direction=start.place_of(element.between) @ outputs if element.between else direction,
+                direction=start.output_selector(element.between) @ outputs if element.between else direction,
                 laws=tuple(found),
             )
             for element, direction, found in zip(start.elements, directions, laws, strict=True)
@@ -164,16 +156,17 @@ class Parameters:
         """Return the counted outputs, float[n, n_outputs], and their derivatives by the vector, float[n, n_outputs, P]."""
         system, modes, inputs = model.system, len(model.frequency_hz), len(model.inputs)
         stretches, ends = _stretches(model, u, nudging)
-        changes = changes_of(model.elements, system.tables)
+        changes = derivative_tables_of(model.elements, system.tables)
         count = 2 * modes + modes * inputs + system.phi.size + changes.element.size + 1
         count += -count % _VECTOR  # columns of zeros before the last
         states = np.zeros((u.shape[1], 3, modes))
         raw = np.zeros((u.shape[1] - counted_from, len(model.outputs), count))
-        state, sens = np.zeros(system.size), Sensitivities.of_rest(system, count)
+        state, sticks = np.zeros(system.size), np.zeros(len(system.tables.sliders), dtype=np.bool_)
+        sens = Sensitivities(np.zeros((system.size, count)), np.zeros((len(system.phi), count)), sticks)  # at rest
         for part, first, last in stretches:
             run_with_sensitivities(
                 part,
-                room_for(part, count),
+                workspace_for(part, count),
                 changes,
                 ends[first * model.steps : last * model.steps + 1],
                 state,
@@ -190,7 +183,7 @@ class Parameters:
                 more = nudging.before - nudging.rate  # what follows is nudged at the second rate
                 sens = sens._replace(rows=not_led(sens.rows, system, more), sums=not_led(sens.sums, system, more))
             if nudging is not None:
-                renew(part, (last - first) / model.sample_rate_hz, state, sens.rows)
+                update_support(part, (last - first) / model.sample_rate_hz, state, sens.rows)
         if nudging is not None:
             raw = not_led(raw, system, nudging.rate)
         found = outputs_of(model, u, states)[:, counted_from:].T
@@ -202,7 +195,6 @@ class Parameters:
         return model.run(stretches, u, ends).outputs[:, counted_from:].T
 
     def _by_vector(self, model: StructuredModel, raw: Float, states: Float, u: Float) -> Float:
-        """Chain rule from the kernel's parameters to the vector."""
         modes, inputs = model.input_shapes.shape
         by_frequency = model.omega / np.cos(0.5 * model.omega * model.step_s) ** 2
         poles = self._poles
@@ -219,7 +211,7 @@ class Parameters:
             columns.append(raw[..., at + np.array(self._kept(element), dtype=int)] / element.scale_m)
             if element.between:
                 by_direction = raw[..., None, at : at + modes] / element.scale_m
-                of_places += self.start.place_of(element.between)[:, None] * by_direction
+                of_places += self.start.output_selector(element.between)[:, None] * by_direction
             at += modes
         for output in self.tied:
             shapes[..., ::inputs] += of_places[:, :, output]
@@ -240,7 +232,6 @@ class Parameters:
 def _stretches(
     model: StructuredModel, u: Float, nudging: Nudging | None
 ) -> tuple[list[tuple[System, int, int]], Float]:
-    """Return the system with the first and last sample of each stretch, and the inputs at the ends of all steps."""
     if nudging is None:
         return [(model.system, 0, u.shape[1])], ends_of_steps(u, model.steps)
     return nudging.stretches(model.system), nudging.ends

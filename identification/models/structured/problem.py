@@ -36,14 +36,7 @@ class ModalTest:
     `StructuredModel.linearised`, with the damping that couples them left out. The last mode is the residual of the modes above,
     of which little is known. Not modelled: a modal test at a level at which joints slip.
 
-    Parameters
-    ----------
-    parameters
-        Free numbers of the model.
-    modes
-        Modal test.
-    linear
-        The model of the test, without elements.
+    ``linear``: the model of the test, without elements.
     """
 
     def __init__(self, parameters: Parameters, modes: LinearModes, linear: StructuredModel) -> None:
@@ -161,7 +154,6 @@ class Problem:
     def _of_one(
         self, model: StructuredModel, experiment: Experiment, nudging: Nudging | None, fine: Float | None = None
     ) -> Float:
-        """Return the triangle of one experiment."""
         weight = np.sqrt(experiment.weight) / self._scale
         found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, nudging)
         of_steps = [] if fine is None else [4.0 / 3.0 * (found - fine)[..., None]]
@@ -170,7 +162,6 @@ class Problem:
         return qr_r(both.reshape(-1, both.shape[2]))
 
     def _cost(self, vector: Float) -> float:
-        """Return the sum of squares."""
         model = self.parameters.model(vector)
 
         def squares(experiment: Experiment, nudging: Nudging | None) -> float:

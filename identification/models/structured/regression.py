@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.kernels import slide_along
+from identification.models.structured.kernels import jenkins_forces
 from identification.models.structured.laws import POSITIVE, Damper, Joint, Law, Spring
 from identification.models.structured.model import StructuredModel
 from vibrolock.arrays import Float
@@ -42,7 +42,7 @@ def law_force(law: Law, x: Float, speed: Float) -> Float:
     if isinstance(law, Damper):
         return law.damping(x) * speed
     out = np.zeros_like(x)
-    slide_along(np.ascontiguousarray(cast(Joint, law).sliders().T), np.ascontiguousarray(x), out)
+    jenkins_forces(np.ascontiguousarray(cast(Joint, law).sliders().T), np.ascontiguousarray(x), out)
     return out
 
 
@@ -87,7 +87,6 @@ def with_regression(
 
 
 def _initialised(law: Law, numbers: Float, scale_m: float) -> Law:
-    """Return a law with the linear numbers that the regression found in J or J s."""
     if not law.linear:
         return law
     found = numbers / (scale_m**2 if isinstance(law, Damper) else scale_m)

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.models.structured.elements import Changes
-from identification.models.structured.kernels import damping_at, mean_spring, slide, spring_at
+from identification.models.structured.elements import DerivativeTables
+from identification.models.structured.kernels import damping_at, jenkins_step, mean_spring, spring_at
 from identification.models.structured.steps import (
-    Room,
     System,
+    Workspace,
     accelerate,
-    along,
+    dot,
     end_step,
     solve,
     take_input,
@@ -34,15 +34,6 @@ class Sensitivities(NamedTuple):
     sticks: np.ndarray
     """bool[n_sliders]."""
 
-    @classmethod
-    def of_rest(cls, system: System, columns: int) -> "Sensitivities":
-        """Return zeros: a state at rest depends on nothing."""
-        return cls(
-            np.zeros((system.size, columns)),
-            np.zeros((len(system.phi), columns)),
-            np.zeros(len(system.tables.sliders), dtype=np.bool_),
-        )
-
 
 @inner_kernel
 def add(out: np.ndarray, factor: float, row: np.ndarray) -> None:
@@ -52,15 +43,14 @@ def add(out: np.ndarray, factor: float, row: np.ndarray) -> None:
 
 
 @inner_kernel
-def clear(row: np.ndarray) -> None:
-    """Write zeros."""
-    for c in range(row.size):
-        row[c] = 0.0
-
-
-@inner_kernel
 def add_linear(
-    system: System, room: Room, speed: np.ndarray, place: np.ndarray, mean: float, sens: np.ndarray, rhs: np.ndarray
+    system: System,
+    work: Workspace,
+    speed: np.ndarray,
+    place: np.ndarray,
+    mean: float,
+    sens: np.ndarray,
+    rhs: np.ndarray,
 ) -> None:
     """Add the explicit derivatives of the forces on the modes at ``place`` and ``speed`` by omega, zeta, b and the support."""
     n, inputs, support = place.size, system.inputs, system.support
@@ -72,51 +62,51 @@ def add_linear(
         rhs[i, i] -= 2.0 * system.zeta[i] * speed[i] + 2.0 * system.omega[i] * place[i]
         rhs[i, n + i] -= 2.0 * system.omega[i] * speed[i]
         for j in range(inputs):
-            rhs[i, 2 * n + i * inputs + j] += room.u[j]
+            rhs[i, 2 * n + i * inputs + j] += work.u[j]
         if steep != 0.0:
             add(rhs[i], -system.b[i, 0] * steep * support[0], sens[2 * n])
             rhs[i, last] -= system.b[i, 0] * steep * mean
 
 
 @inner_kernel
-def of_displacement(system: System, room: Room, e: int, place: np.ndarray, sens: np.ndarray) -> None:
-    """Write the derivatives of an element's displacement by the parameters into ``room.row``."""
+def of_displacement(system: System, work: Workspace, e: int, place: np.ndarray, sens: np.ndarray) -> None:
+    """Write the derivatives of an element's displacement by the parameters into ``work.row``."""
     n = place.size
     begin = 2 * n + n * system.inputs + e * n
-    clear(room.row)
+    work.row[:] = 0.0
     for i in range(n):
-        add(room.row, system.phi[e, i], sens[i])
-        room.row[begin + i] += place[i]
+        add(work.row, system.phi[e, i], sens[i])
+        work.row[begin + i] += place[i]
 
 
 @inner_kernel
-def add_pull(system: System, room: Room, e: int, speed: np.ndarray, rhs: np.ndarray) -> None:
-    """Add the derivatives of an element's force on the modes, whose size has the derivatives ``room.pull``."""
+def add_dforce(system: System, work: Workspace, e: int, speed: np.ndarray, rhs: np.ndarray) -> None:
+    """Add the derivatives of an element's force on the modes, whose size has the derivatives ``work.dforce``."""
     n = speed.size
     begin = 2 * n + n * system.inputs + e * n
     for k in range(n):
-        room.pull[begin + k] += room.forces[e, 2] * speed[k]
-        rhs[k, begin + k] -= room.forces[e, 0]
+        work.dforce[begin + k] += work.forces[e, 2] * speed[k]
+        rhs[k, begin + k] -= work.forces[e, 0]
     for i in range(n):
-        add(rhs[i], -system.phi[e, i], room.pull)
+        add(rhs[i], -system.phi[e, i], work.dforce)
 
 
 @inner_kernel
-def add_sliders(system: System, room: Room, e: int, derivatives: Sensitivities) -> None:
-    """Add the derivatives of the forces of an element's sliders to ``room.pull``; ``room.row``: of its displacement."""
+def add_sliders(system: System, work: Workspace, e: int, derivatives: Sensitivities) -> None:
+    """Add the derivatives of the forces of an element's sliders to ``work.dforce``; ``work.row``: of its displacement."""
     tables, stiffness = system.tables, 0.0
     for s in range(tables.first[e], tables.first[e + 1]):
         if derivatives.sticks[s]:
             stiffness += tables.sliders[s, 0]
-    add(room.pull, stiffness, room.row)
-    add(room.pull, 1.0, derivatives.sums[e])
+    add(work.dforce, stiffness, work.row)
+    add(work.dforce, 1.0, derivatives.sums[e])
 
 
 @inner_kernel
 def of_acceleration(
     system: System,
-    room: Room,
-    changes: Changes,
+    work: Workspace,
+    changes: DerivativeTables,
     state: np.ndarray,
     derivatives: Sensitivities,
     rhs: np.ndarray,
@@ -129,33 +119,35 @@ def of_acceleration(
         omega = system.omega[i]
         for c in range(columns):
             rhs[i, c] = -2.0 * system.zeta[i] * omega * sens[n + i, c] - omega * omega * sens[i, c]
-    add_linear(system, room, v, q, state[2 * n], sens, rhs)
+    add_linear(system, work, v, q, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        of_displacement(system, room, e, q, sens)
-        clear(room.pull)
-        add(room.pull, room.forces[e, 1], room.row)
+        of_displacement(system, work, e, q, sens)
+        work.dforce[:] = 0.0
+        add(work.dforce, work.forces[e, 1], work.row)
         for i in range(n):
-            add(room.pull, system.phi[e, i] * room.forces[e, 2], sens[n + i])
-        add_sliders(system, room, e, derivatives)
+            add(work.dforce, system.phi[e, i] * work.forces[e, 2], sens[n + i])
+        add_sliders(system, work, e, derivatives)
         for s in range(tables.first[e], tables.first[e + 1]):
             if not derivatives.sticks[s]:
-                add(room.pull, 1.0, sens[2 * n + 1 + s])
-        add_laws_at(system, room, changes, e, q, v)
-        add_pull(system, room, e, v, rhs)
+                add(work.dforce, 1.0, sens[2 * n + 1 + s])
+        add_laws_at(system, work, changes, e, q, v)
+        add_dforce(system, work, e, v, rhs)
 
 
 @inner_kernel
-def add_laws_at(system: System, room: Room, changes: Changes, e: int, q: np.ndarray, v: np.ndarray) -> None:
-    """Add the derivatives of an element's force at a sample by the numbers of its springs and dampers to ``room.pull``."""
+def add_laws_at(
+    system: System, work: Workspace, changes: DerivativeTables, e: int, q: np.ndarray, v: np.ndarray
+) -> None:
+    """Add the derivatives of an element's force at a sample by the numbers of its springs and dampers to ``work.dforce``."""
     begin, springs, dampers = law_columns(system), changes.springs.shape[0], changes.dampers.shape[0]
-    x, rate = along(q, system.phi[e]), along(v, system.phi[e])
+    x, rate = dot(q, system.phi[e]), dot(v, system.phi[e])
     for k in range(springs + dampers):
         if changes.element[k] != e:
             continue
         if k < springs:
-            room.pull[begin + k] += spring_at(x, changes.springs[k], changes.limits[k])[0]
+            work.dforce[begin + k] += spring_at(x, changes.springs[k], changes.limits[k])[0]
         else:
-            room.pull[begin + k] += damping_at(x, changes.dampers[k - springs], system.tables.limits[e, 0])[0] * rate
+            work.dforce[begin + k] += damping_at(x, changes.dampers[k - springs], system.tables.limits[e, 0])[0] * rate
 
 
 @inner_kernel
@@ -168,8 +160,8 @@ def law_columns(system: System) -> int:
 @inner_kernel
 def of_step(
     system: System,
-    room: Room,
-    changes: Changes,
+    work: Workspace,
+    changes: DerivativeTables,
     state: np.ndarray,
     half: np.ndarray,
     derivatives: Sensitivities,
@@ -178,93 +170,93 @@ def of_step(
 ) -> None:
     """Write the derivatives of the mean velocities of a step by the parameters; ``half`` gets the middle of the step.
 
-    ``room.stuck`` gets the share of the step over which each slider sticks.
+    ``work.stuck`` gets the share of the step over which each slider sticks.
     """
     sens = derivatives.rows
     n, columns, h = system.omega.size, sens.shape[1], system.step_s
     q = state[:n]
     for i in range(n):
-        half[i] = q[i] + 0.5 * h * room.mean[i]
+        half[i] = q[i] + 0.5 * h * work.mean[i]
         for c in range(columns):
             rhs[i, c] = 2.0 / h * sens[n + i, c] - system.omega[i] * system.omega[i] * sens[i, c]
         for k in range(n):
             matrix[i, k] = 0.0
-        matrix[i, i] = room.rigidity[i]
-    add_linear(system, room, room.mean, half, state[2 * n], sens, rhs)
+        matrix[i, i] = work.effective_stiffness[i]
+    add_linear(system, work, work.mean, half, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        of_displacement(system, room, e, q, sens)
-        clear(room.pull)
-        add(room.pull, room.forces[e, 1], room.row)
-        begin_sticking(system, room, e, state, derivatives)
-        add_sliders(system, room, e, derivatives)
-        of_slips(system, room, e, derivatives)
-        add_laws(system, room, changes, e, along(q, system.phi[e]))
-        add_pull(system, room, e, room.mean, rhs)
+        of_displacement(system, work, e, q, sens)
+        work.dforce[:] = 0.0
+        add(work.dforce, work.forces[e, 1], work.row)
+        begin_sticking(system, work, e, state, derivatives)
+        add_sliders(system, work, e, derivatives)
+        of_slips(system, work, e, derivatives)
+        add_laws(system, work, changes, e, dot(q, system.phi[e]))
+        add_dforce(system, work, e, work.mean, rhs)
         for i in range(n):
             for k in range(n):
-                matrix[i, k] += room.forces[e, 2] * system.phi[e, i] * system.phi[e, k]
+                matrix[i, k] += work.forces[e, 2] * system.phi[e, i] * system.phi[e, k]
     solve(matrix, rhs, n, columns)
 
 
 @inner_kernel
-def begin_sticking(system: System, room: Room, e: int, state: np.ndarray, derivatives: Sensitivities) -> None:
+def begin_sticking(system: System, work: Workspace, e: int, state: np.ndarray, derivatives: Sensitivities) -> None:
     """Write the share of the step over which each slider of an element sticks; those that begin to stick get their rows."""
     n, tables = system.omega.size, system.tables
     for s in range(tables.first[e], tables.first[e + 1]):
         at = 2 * n + 1 + s
         stiffness = tables.sliders[s, 0]
-        room.stuck[s] = slide(state[at], stiffness, tables.sliders[s, 1], system.step_s * room.w[e])[3]
-        if room.stuck[s] > 0.0 and not derivatives.sticks[s]:
-            add(derivatives.rows[at], -stiffness, room.row)
+        work.stuck[s] = jenkins_step(state[at], stiffness, tables.sliders[s, 1], system.step_s * work.w[e])[3]
+        if work.stuck[s] > 0.0 and not derivatives.sticks[s]:
+            add(derivatives.rows[at], -stiffness, work.row)
             add(derivatives.sums[e], 1.0, derivatives.rows[at])
             derivatives.sticks[s] = True
 
 
 @inner_kernel
-def of_slips(system: System, room: Room, e: int, derivatives: Sensitivities) -> None:
+def of_slips(system: System, work: Workspace, e: int, derivatives: Sensitivities) -> None:
     """Take what sliders lose that slip in this step from the derivatives of their forces, and end their sticking."""
     n, tables = system.omega.size, system.tables
     for s in range(tables.first[e], tables.first[e + 1]):
-        if derivatives.sticks[s] and room.stuck[s] < 1.0:
+        if derivatives.sticks[s] and work.stuck[s] < 1.0:
             own = derivatives.rows[2 * n + 1 + s]
-            add(room.pull, (room.stuck[s] - 1.0) * tables.sliders[s, 0], room.row)
-            add(room.pull, room.stuck[s] - 1.0, own)
+            add(work.dforce, (work.stuck[s] - 1.0) * tables.sliders[s, 0], work.row)
+            add(work.dforce, work.stuck[s] - 1.0, own)
             add(derivatives.sums[e], -1.0, own)
-            clear(own)
+            own[:] = 0.0
             derivatives.sticks[s] = False
 
 
 @inner_kernel
-def add_laws(system: System, room: Room, changes: Changes, e: int, x: float) -> None:
-    """Add the derivatives of an element's mean force over a step from ``x`` by the numbers of its laws to ``room.pull``."""
-    begin, way, reach = law_columns(system), system.step_s * room.w[e], system.tables.limits[e, 0]
+def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int, x: float) -> None:
+    """Add the derivatives of an element's mean force over a step from ``x`` by the numbers of its laws to ``work.dforce``."""
+    begin, way, reach = law_columns(system), system.step_s * work.w[e], system.tables.limits[e, 0]
     springs, dampers = changes.springs.shape[0], changes.dampers.shape[0]
     for k in range(springs + dampers):
         if changes.element[k] != e:
             continue
         if k < springs:
-            room.pull[begin + k] += mean_spring(x, way, changes.springs[k], changes.limits[k])[0]
+            work.dforce[begin + k] += mean_spring(x, way, changes.springs[k], changes.limits[k])[0]
         else:
-            room.pull[begin + k] += damping_at(x + 0.5 * way, changes.dampers[k - springs], reach)[0] * room.w[e]
+            work.dforce[begin + k] += damping_at(x + 0.5 * way, changes.dampers[k - springs], reach)[0] * work.w[e]
     begin, sign = begin + springs + dampers, math.copysign(1.0, way)
     for k in range(changes.sliders.shape[0]):
         if changes.element[springs + dampers + k] != e:
             continue
         total = 0.0
         for s in range(changes.first[k], changes.last[k]):
-            by, share = changes.sliders[k, s], room.stuck[s]
+            by, share = changes.sliders[k, s], work.stuck[s]
             total += sign * (1.0 - share) * by[1] + 0.5 * share * share * way * by[0]
-        room.pull[begin + k] += total
+        work.dforce[begin + k] += total
 
 
 @inner_kernel
-def end_sliders(system: System, room: Room, changes: Changes, derivatives: Sensitivities) -> None:
+def end_sliders(system: System, work: Workspace, changes: DerivativeTables, derivatives: Sensitivities) -> None:
     """Take the derivatives of the sliders by the numbers of their joints to the end of the step."""
     n = system.omega.size
     joints = changes.springs.shape[0] + changes.dampers.shape[0]
     for k in range(changes.sliders.shape[0]):
         e, column = changes.element[joints + k], law_columns(system) + joints + k
-        way = system.step_s * room.w[e]
+        way = system.step_s * work.w[e]
         for s in range(changes.first[k], changes.last[k]):
             by, own = changes.sliders[k, s], derivatives.rows[2 * n + 1 + s]
             if derivatives.sticks[s]:
@@ -279,7 +271,7 @@ def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: n
     """Take the sensitivities of displacements, velocities and support to the end of the step."""
     n, h, inputs = half.size, system.step_s, system.inputs
     alpha, last = 0.5 * h * system.support[1], sens.shape[0] - 1
-    clear(row)
+    row[:] = 0.0
     for i in range(n):
         add(row, system.b[i, 0], sens[i])
         add(row, 0.5 * h * system.b[i, 0], rhs[i])
@@ -305,8 +297,8 @@ def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: n
 @unlocked_kernel
 def run_with_sensitivities(
     system: System,
-    room: Room,
-    changes: Changes,
+    work: Workspace,
+    changes: DerivativeTables,
     u: np.ndarray,
     state: np.ndarray,
     states: np.ndarray,
@@ -321,8 +313,8 @@ def run_with_sensitivities(
     """As `run`, and write the derivatives of ``outputs . motion`` by the parameters from sample ``counted_from``.
 
     Parameters, in this order: omega, zeta, b of the model's inputs (row by row), phi (row by row), the numbers of the laws as
-    in `Changes`, zeros if there is room, the support's stiffness. ``derivatives``: those of the state.
-    ``motions``: 0, 1, 2 for displacement, velocity, acceleration. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P].
+    in `DerivativeTables`, zeros if there is work, the support's stiffness. ``derivatives``: those of the state.
+    ``motions``: 0, 1, 2 for displacement, velocity, acceleration. ``matrix``: work, [n + 1, n]. ``rhs``: work, [n, P].
     ``jacobian``: [N - counted_from, n_outputs, P], zero at first.
     """
     n = system.omega.size
@@ -330,20 +322,20 @@ def run_with_sensitivities(
     sens = derivatives.rows
     for sample in range(states.shape[0]):
         first = sample * system.steps
-        take_input(system, room, u, first, first, state[2 * n])
-        accelerate(system, room, q, v, r, states[sample, 2])
+        take_input(system, work, u, first, first, state[2 * n])
+        accelerate(system, work, q, v, r, states[sample, 2])
         for i in range(n):
             states[sample, 0, i], states[sample, 1, i] = q[i], v[i]
         if sample >= counted_from:
-            of_acceleration(system, room, changes, state, derivatives, rhs)
+            of_acceleration(system, work, changes, state, derivatives, rhs)
             for o in range(outputs.shape[0]):
                 out = jacobian[sample - counted_from, o]  # zero so far
                 for i in range(n):
                     add(out, outputs[o, i], rhs[i] if motions[o] == 2 else sens[motions[o] * n + i])
         for row in range(first, first + system.steps):
-            take_input(system, room, u, row, row + 1, state[2 * n])
-            take_step(system, room, q, v, r)
-            of_step(system, room, changes, state, half, derivatives, matrix, rhs)
-            end_sliders(system, room, changes, derivatives)
-            end_sensitivities(system, half, sens, rhs, room.row)
-            end_step(system, room, q, v, state)
+            take_input(system, work, u, row, row + 1, state[2 * n])
+            take_step(system, work, q, v, r)
+            of_step(system, work, changes, state, half, derivatives, matrix, rhs)
+            end_sliders(system, work, changes, derivatives)
+            end_sensitivities(system, half, sens, rhs, work.row)
+            end_step(system, work, q, v, state)

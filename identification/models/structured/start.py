@@ -12,8 +12,8 @@ from identification.fitting.bounded_steps import qr_r
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan
 from identification.models.structured.laws import Damper, Joint, Law, Spring
-from identification.models.structured.modal_motion import LOWEST, modal_spectra
 from identification.models.structured.model import StructuredModel
+from identification.models.structured.nudging import LOWEST, modal_spectra
 from identification.models.structured.regression import (
     Regression,
     bounded_regression,
@@ -210,7 +210,7 @@ def with_further_element(
     """
     parts = [_ModalMotion(model, one, measured_modes) for one in _periodic(experiments)]
     shapes = model.output_shapes[:, :measured_modes]
-    directions = [model.place_of(plan.between) @ shapes] if plan.between else _directions(shapes)
+    directions = [model.output_selector(plan.between) @ shapes] if plan.between else _directions(shapes)
     found = [
         _regression_of_modes(parts, direction, list(tried))
         for direction in directions
@@ -220,12 +220,11 @@ def with_further_element(
     direction = np.zeros(len(model.omega))
     direction[:measured_modes] = best.direction
     if plan.between:
-        direction = model.place_of(plan.between) @ model.output_shapes
+        direction = model.output_selector(plan.between) @ model.output_shapes
     return with_regression(model, best, range(measured_modes), reach, (direction, plan.between))
 
 
 def _directions(shapes: Float) -> list[Float]:
-    """Return the directions that are tried, as large as the largest shape."""
     modes = shapes.shape[1]
     found = [*np.eye(modes), *shapes]
     for i, j in combinations(range(modes), 2):
@@ -265,7 +264,6 @@ class _ModalMotion:
 
 
 def _regression_of_modes(parts: Sequence[_ModalMotion], direction: Float, laws: list[Law]) -> Regression:
-    """Return the numbers in which ``laws`` are linear."""
     scale = max(float(np.max(np.abs(direction @ part.q))) for part in parts)
     basis = [one for law in laws for one in law.basis()]
     modes = np.eye(direction.size)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.models.structured.elements import Tables
-from identification.models.structured.kernels import damping_at, slide, spring_at, step_force
+from identification.models.structured.kernels import damping_at, jenkins_step, spring_at, step_force
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 NEWTON = 60  # iterations at most; a step that is not solved by then is counted
@@ -53,17 +53,17 @@ class System(NamedTuple):
         return 2 * len(self.omega) + 2 + len(self.tables.sliders)
 
 
-def led(system: System, rate: np.ndarray) -> System:
+def nudged(system: System, rate: np.ndarray) -> System:
     """Return the system with more damping, and with one more input for each mode."""
     return system._replace(zeta=system.zeta + 0.5 * rate / system.omega, b=np.hstack([system.b, np.diag(rate)]))
 
 
-class Room(NamedTuple):
-    """Room for a step, so that nothing is allocated."""
+class Workspace(NamedTuple):
+    """Workspace for a step, so that nothing is allocated."""
 
-    rigidity: np.ndarray
+    effective_stiffness: np.ndarray
     """float[n]: what multiplies the mean velocity of a mode in the equation of a step."""
-    yields: np.ndarray
+    compliance: np.ndarray
     """float[n_elements, n]: mean velocity of a mode by the force of an element."""
     shared: np.ndarray
     """float[n_elements, n_elements]: rate of an element by the force of another."""
@@ -75,7 +75,7 @@ class Room(NamedTuple):
     coupling: np.ndarray
     change: np.ndarray
     row: np.ndarray
-    pull: np.ndarray
+    dforce: np.ndarray
     """float[P] each: of the sensitivities."""
     stuck: np.ndarray
     """float[n_sliders]: share of a step over which each sticks, of the sensitivities."""
@@ -114,7 +114,7 @@ def solve(matrix: np.ndarray, rhs: np.ndarray, n: int, columns: int) -> None:
 
 
 @inner_kernel
-def along(vector: np.ndarray, row: np.ndarray) -> float:
+def dot(vector: np.ndarray, row: np.ndarray) -> float:
     """Return the scalar product."""
     total = 0.0
     for i in range(vector.size):
@@ -123,116 +123,117 @@ def along(vector: np.ndarray, row: np.ndarray) -> float:
 
 
 @inner_kernel
-def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, r: np.ndarray) -> None:
-    """Solve a step under the mean input ``room.u``: write the mean velocity, and what every element does at the solution."""
+def take_step(system: System, work: Workspace, q: np.ndarray, v: np.ndarray, r: np.ndarray) -> None:
+    """Solve a step under the mean input ``work.u``: write the mean velocity, and what every element does at the solution."""
     h, elements = system.step_s, system.phi.shape[0]
     for i in range(q.size):
-        push = 2.0 * v[i] / h - system.omega[i] * system.omega[i] * q[i] + along(room.u, system.b[i])
-        room.free[i] = push / room.rigidity[i]
-        room.mean[i] = room.free[i]
+        push = 2.0 * v[i] / h - system.omega[i] * system.omega[i] * q[i] + dot(work.u, system.b[i])
+        work.free[i] = push / work.effective_stiffness[i]
+        work.mean[i] = work.free[i]
     for e in range(elements):
-        room.w[e] = along(v, system.phi[e])
+        work.w[e] = dot(v, system.phi[e])
     solved = elements == 0
     for iteration in range(NEWTON if elements else 0):
-        if newton(system, room, q, r, 1.0 if iteration < CAREFUL else 0.5):
+        if newton(system, work, q, r, 1.0 if iteration < CAREFUL else 0.5):
             solved = True
             break
     if not solved:
-        room.unsolved[0] += 1
+        work.unsolved[0] += 1
     for e in range(elements):
         for i in range(q.size):
-            room.mean[i] -= room.yields[e, i] * room.forces[e, 0]
+            work.mean[i] -= work.compliance[e, i] * work.forces[e, 0]
 
 
 @inner_kernel
-def evaluate(system: System, room: Room, q: np.ndarray, r: np.ndarray, e: int) -> None:
+def evaluate(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, e: int) -> None:
     """Write the mean force of an element over the step, and its derivatives by x and the rate."""
     h, tables = system.step_s, system.tables
-    x = along(q, system.phi[e])
-    force, by_x, by_w = step_force(x, room.w[e], h, tables.springs[e], tables.dampers[e], tables.limits[e])
+    x = dot(q, system.phi[e])
+    force, by_x, by_w = step_force(x, work.w[e], h, tables.springs[e], tables.dampers[e], tables.limits[e])
     for s in range(tables.first[e], tables.first[e + 1]):
-        mean, _, by_way, _ = slide(r[s], tables.sliders[s, 0], tables.sliders[s, 1], h * room.w[e])
+        mean, _, by_way, _ = jenkins_step(r[s], tables.sliders[s, 0], tables.sliders[s, 1], h * work.w[e])
         force += mean
         by_w += h * by_way
-    room.forces[e, 0], room.forces[e, 1], room.forces[e, 2] = force, by_x, by_w
+    work.forces[e, 0], work.forces[e, 1], work.forces[e, 2] = force, by_x, by_w
 
 
 @inner_kernel
-def newton(system: System, room: Room, q: np.ndarray, r: np.ndarray, share: float) -> bool:
+def newton(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, share: float) -> bool:
     """Correct mean velocities of all elements once, and their forces along the tangents; return whether the change is small."""
-    elements = room.w.size
+    elements = work.w.size
     for e in range(elements):
-        evaluate(system, room, q, r, e)
+        evaluate(system, work, q, r, e)
     for e in range(elements):
-        miss = along(room.free, system.phi[e]) - room.w[e]
+        miss = dot(work.free, system.phi[e]) - work.w[e]
         for f in range(elements):
-            miss -= room.shared[e, f] * room.forces[f, 0]
-            room.coupling[e, f] = room.shared[e, f] * room.forces[f, 2] + (1.0 if e == f else 0.0)
-        room.change[e, 0] = miss
-    solve(room.coupling, room.change, elements, 1)
+            miss -= work.shared[e, f] * work.forces[f, 0]
+            work.coupling[e, f] = work.shared[e, f] * work.forces[f, 2] + (1.0 if e == f else 0.0)
+        work.change[e, 0] = miss
+    solve(work.coupling, work.change, elements, 1)
     done = True
     for e in range(elements):
-        size = abs(room.w[e])
+        size = abs(work.w[e])
         for i in range(q.size):
-            size += abs(system.phi[e, i]) * (abs(room.free[i]) + SMALL * abs(q[i]) / system.step_s)
-        if abs(room.change[e, 0]) > CLOSE * size + 1e-300:
+            size += abs(system.phi[e, i]) * (abs(work.free[i]) + SMALL * abs(q[i]) / system.step_s)
+        if abs(work.change[e, 0]) > CLOSE * size + 1e-300:
             done = False
     for e in range(elements):
-        change = room.change[e, 0] * (1.0 if done else share)  # the last one is taken whole
-        room.w[e] += change
-        room.forces[e, 0] += change * room.forces[e, 2]
+        change = work.change[e, 0] * (1.0 if done else share)  # the last one is taken whole
+        work.w[e] += change
+        work.forces[e, 0] += change * work.forces[e, 2]
     return done
 
 
 @inner_kernel
-def accelerate(system: System, room: Room, q: np.ndarray, v: np.ndarray, r: np.ndarray, out: np.ndarray) -> None:
-    """Write the acceleration under ``room.u``, and force of every element with its derivatives by x and its rate."""
+def accelerate(system: System, work: Workspace, q: np.ndarray, v: np.ndarray, r: np.ndarray, out: np.ndarray) -> None:
+    """Write the acceleration under ``work.u``, and force of every element with its derivatives by x and its rate."""
     tables = system.tables
     for i in range(q.size):
         omega = system.omega[i]
-        out[i] = along(room.u, system.b[i]) - 2.0 * system.zeta[i] * omega * v[i] - omega * omega * q[i]
+        out[i] = dot(work.u, system.b[i]) - 2.0 * system.zeta[i] * omega * v[i] - omega * omega * q[i]
     for e in range(system.phi.shape[0]):
-        x, rate = along(q, system.phi[e]), along(v, system.phi[e])
+        x, rate = dot(q, system.phi[e]), dot(v, system.phi[e])
         force, slope, _ = spring_at(x, tables.springs[e], tables.limits[e])
         damping, steep = damping_at(x, tables.dampers[e], tables.limits[e, 0])
         for s in range(tables.first[e], tables.first[e + 1]):
             force += r[s]
-        room.forces[e, 0] = force + damping * rate
-        room.forces[e, 1], room.forces[e, 2] = slope + steep * rate, damping
+        work.forces[e, 0] = force + damping * rate
+        work.forces[e, 1], work.forces[e, 2] = slope + steep * rate, damping
         for i in range(q.size):
-            out[i] -= system.phi[e, i] * room.forces[e, 0]
+            out[i] -= system.phi[e, i] * work.forces[e, 0]
 
 
 @inner_kernel
-def static_force(support: np.ndarray, mean: float) -> float:
-    """Return the force of the support on the structure at the filtered displacement ``mean``, bounded smoothly."""
-    return -support[2] * math.tanh(support[0] * mean / support[2]) if support[2] > 0.0 else 0.0
+def take_input(system: System, work: Workspace, u: np.ndarray, row: int, other: int, mean: float) -> None:
+    """Write the mean of two rows of the inputs, and add the support's force, bounded smoothly, to the first input.
 
-
-@inner_kernel
-def take_input(system: System, room: Room, u: np.ndarray, row: int, other: int, mean: float) -> None:
-    """Write the mean of two rows of the inputs, and add the support's force to the first input."""
+    ``mean``: filtered displacement there.
+    """
+    support = system.support
     for j in range(u.shape[1]):
-        room.u[j] = 0.5 * (u[row, j] + u[other, j])
-    room.u[0] += static_force(system.support, mean)
+        work.u[j] = 0.5 * (u[row, j] + u[other, j])
+    if support[2] > 0.0:
+        work.u[0] -= support[2] * math.tanh(support[0] * mean / support[2])
 
 
 @inner_kernel
-def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np.ndarray) -> None:
-    """Go to the end of the step; sliders slide, and the support's filter follows the displacement of the first input.
+def end_step(system: System, work: Workspace, q: np.ndarray, v: np.ndarray, state: np.ndarray) -> None:
+    """Go to the end of the step; sliders jenkins_step, and the support's filter follows the displacement of the first input.
 
-    While the force is held, the last state is the integral of that displacement (`held_support`).
+    While the force is held, the last state is the integral of that displacement (`frozen_support`).
     """
     alpha, there = 0.5 * system.step_s * system.support[1], 0.0
     tables, n = system.tables, q.size
     for e in range(system.phi.shape[0]):
         for s in range(tables.first[e], tables.first[e + 1]):
             at = 2 * n + 1 + s
-            state[at] = slide(state[at], tables.sliders[s, 0], tables.sliders[s, 1], system.step_s * room.w[e])[1]
+            state[at] = jenkins_step(state[at], tables.sliders[s, 0], tables.sliders[s, 1], system.step_s * work.w[e])[
+                1
+            ]
     for i in range(q.size):
-        there += system.b[i, 0] * (q[i] + 0.5 * system.step_s * room.mean[i])
-        q[i] += system.step_s * room.mean[i]
-        v[i] = 2.0 * room.mean[i] - v[i]
+        there += system.b[i, 0] * (q[i] + 0.5 * system.step_s * work.mean[i])
+        q[i] += system.step_s * work.mean[i]
+        v[i] = 2.0 * work.mean[i] - v[i]
     last = state.size - 1
     before = state[last]
     if alpha == 0.0:
@@ -243,7 +244,7 @@ def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np
 
 
 @unlocked_kernel
-def run(system: System, room: Room, u: np.ndarray, state: np.ndarray, states: np.ndarray) -> None:
+def run(system: System, work: Workspace, u: np.ndarray, state: np.ndarray, states: np.ndarray) -> None:
     """Simulate from ``state`` [`System.size`] and write displacement, velocity and acceleration at every sample, [N, 3, n].
 
     ``u``: [N steps + 1, n_inputs], inputs at the ends of all steps.
@@ -252,11 +253,11 @@ def run(system: System, room: Room, u: np.ndarray, state: np.ndarray, states: np
     q, v, r = state[:n], state[n : 2 * n], state[2 * n + 1 :]
     for sample in range(states.shape[0]):
         first = sample * system.steps
-        take_input(system, room, u, first, first, state[2 * n])
-        accelerate(system, room, q, v, r, states[sample, 2])
+        take_input(system, work, u, first, first, state[2 * n])
+        accelerate(system, work, q, v, r, states[sample, 2])
         for i in range(n):
             states[sample, 0, i], states[sample, 1, i] = q[i], v[i]
         for row in range(first, first + system.steps):
-            take_input(system, room, u, row, row + 1, state[2 * n])
-            take_step(system, room, q, v, r)
-            end_step(system, room, q, v, state)
+            take_input(system, work, u, row, row + 1, state[2 * n])
+            take_step(system, work, q, v, r)
+            end_step(system, work, q, v, state)

@@ -1,14 +1,14 @@
 """Blocks of samples of a run with the derivatives of its outputs, so that memory does not grow with the number of samples."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
-from identification.models.pnlss.fitting.kernels import linearise, run, sensitivities
-from identification.models.pnlss.fitting.layout import System, slopes_of
-from identification.models.pnlss.fitting.records import BOUND, Record
+from identification.models.pnlss.fitting.kernels import System, linearise, run, sensitivities, slopes_of
+from identification.models.pnlss.fitting.records import BOUND, Record, simulated
 from vibrolock.arrays import Float
 
 Derivatives = Literal["parameters", "state", "all"]
@@ -79,8 +79,7 @@ class Blocks:
     @property
     def s(self) -> Float:
         """float[n_states, n_sensitivities] after the last block."""
-        found: Float = self._s[0]
-        return found
+        return np.asarray(self._s[0])
 
     def __iter__(self) -> Iterator[bool]:
         """Yield True for each block; False at the end of a run that leaves all bounds. Possible only once."""
@@ -141,3 +140,55 @@ def _by_weights(v: Float, steep: Float) -> Float:
     """float[n, n_weights]: derivatives of functions of weighted sums with respect to the weights."""
     found = np.concatenate([steep[:, :, :1] * v[:, None], steep[:, :, :1] - steep[:, :, 1:]], axis=2)
     return found.reshape(len(v), -1)
+
+
+SAMPLES = 600
+"""Number of samples from which an initial state is estimated: a few decay times of lightly damped structures at usual rates."""
+PRIOR = 1e-6
+"""Weight of the squared initial state (states of unit RMS) relative to the squared errors (outputs of unit RMS).
+
+It matters only for unobservable states.
+"""
+_ITERATIONS = 20
+
+
+def fitted_initial_state(system: System, record: Record, weights: Float, samples: int = SAMPLES) -> Float:
+    """Fit the initial state, float[n_states], to the first ``samples`` counted outputs by Levenberg-Marquardt from rest.
+
+    The result is rest if the run from rest is unbounded.
+    """
+    n, end = len(system.state), min(record.counted_from + samples, len(record.u))
+    first, u, y = record.counted_from, record.u[:end], record.y[:end]
+
+    def error(x: Float) -> float:
+        run = simulated(system, u, x)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return (
+                float(np.inf) if run is None else float(np.sum((weights * (run[1] - y)[first:]) ** 2) + PRIOR * x @ x)
+            )
+
+    x, damping = np.zeros(n), 1e-6
+    best = error(x)
+    for _ in range(_ITERATIONS):
+        products, gradient = PRIOR * np.eye(n), PRIOR * x
+        blocks = Blocks(system, replace(record, lines=None), weights, x, (0, end), "state")
+        with np.errstate(over="ignore", invalid="ignore"):
+            for bounded in blocks:
+                rows = blocks.rows[:, n:].reshape(-1, blocks.columns) * (1.0 if bounded else np.nan)
+                products += rows[:, :n].T @ rows[:, :n]
+                gradient += rows[:, :n].T @ rows[:, -1]
+        if not np.all(np.isfinite(products)):
+            break
+        values, vectors = np.linalg.eigh(products)
+        along = vectors.T @ gradient
+        before = best
+        while damping < 1e6:
+            step = -vectors @ (along / (values + damping * values[-1]))
+            tried = error(x + step)
+            if tried < best:
+                x, best, damping = x + step, tried, damping / 100.0
+                break
+            damping *= 10.0
+        if best > before * (1.0 - 1e-10):
+            break
+    return x

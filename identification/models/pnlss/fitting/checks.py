@@ -78,7 +78,6 @@ def check_data(
 
 
 def _check_validation(experiments: Sequence[Experiment], validation: Sequence[Experiment]) -> None:
-    """Raise an error if validation data is also training data, or has an output that is zero throughout."""
     for index, one in enumerate(validation):
         twin = next((k for k, other in enumerate(experiments) if same_data(one, other)), None)
         if twin is not None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.models.pnlss.fitting.blocks import Blocks
 from identification.models.pnlss.fitting.records import Record
-from identification.models.pnlss.fitting.settings import FitSettings
+from identification.models.pnlss.fitting.result import FitSettings
 from vibrolock.arrays import Float
 
 _COLUMNS = 64

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from identification.models.pnlss.features import with_weights
-from identification.models.pnlss.fitting.layout import System
+from identification.models.pnlss.fitting.kernels import System
 from identification.models.pnlss.kernels import Matrices, Table
 from identification.models.pnlss.model import PnlssModel
 from vibrolock.arrays import Float
@@ -18,17 +18,12 @@ class Parameters:
 
     The shared parameters are [A B E] row by row, the weights in the state features row by row, those in the output features,
     and the estimated initial states of experiments. The own parameters of the outputs are [C D F] row by row.
-
-    Parameters
-    ----------
-    start
-        A model of the same structure, which supplies everything that is not a parameter.
-    estimated
-        Number of experiments with an estimated initial state.
     """
 
     start: PnlssModel
+    """A model of the same structure, which supplies everything that is not a parameter."""
     estimated: int = 0
+    """Number of experiments with an estimated initial state."""
 
     @cached_property
     def tables(self) -> tuple[Table, Table]:
@@ -124,21 +119,12 @@ class Parameters:
 
     def model(self, vector: Float) -> PnlssModel:
         """Return the model with these parameters."""
-        system, start = self.system(vector), self.start
+        system, start, n = self.system(vector), self.start, self.start.states
+        ends = (n, start.state_features.variables)
+        parts = (part for matrix in (system.state, system.output) for part in np.split(matrix, ends, axis=1))
         return replace(
             start,
-            **matrices_of(system)._asdict(),
+            **Matrices(*map(np.ascontiguousarray, parts))._asdict(),
             state_features=replace(start.state_features, weights=system.state_table.weights),
             output_features=replace(start.output_features, weights=system.output_table.weights),
         )
-
-
-def matrices_of(system: System) -> Matrices:
-    """Return A, B, E, C, D and F as separate matrices."""
-    n, variables = system.state.shape[0], system.state_table.limits.size
-    parts = [
-        m[:, begin:end]
-        for m in (system.state, system.output)
-        for begin, end in ((0, n), (n, variables), (variables, None))
-    ]
-    return Matrices(*(np.ascontiguousarray(part) for part in parts))

@@ -9,13 +9,13 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.fitting.threads import threads
 from identification.fitting.truncated_steps import TruncatedSteps
+from identification.models.pnlss.fitting.blocks import PRIOR, fitted_initial_state
 from identification.models.pnlss.fitting.frequency_lines import with_lines
-from identification.models.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
-from identification.models.pnlss.fitting.layout import System
+from identification.models.pnlss.fitting.kernels import System
 from identification.models.pnlss.fitting.normal_equations import NormalEquations, normal_equations
 from identification.models.pnlss.fitting.parameters import Parameters
 from identification.models.pnlss.fitting.records import Record, records_of, simulated
-from identification.models.pnlss.fitting.settings import FitSettings
+from identification.models.pnlss.fitting.result import FitSettings
 from identification.models.pnlss.model import PnlssModel
 from vibrolock.arrays import Float
 

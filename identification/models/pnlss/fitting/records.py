@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.experiments.experiment import Experiment
-from identification.models.pnlss.fitting.kernels import run
-from identification.models.pnlss.fitting.layout import System
+from identification.models.pnlss.fitting.kernels import System, run
 from vibrolock.arrays import Float
 
 BOUND = 1e6

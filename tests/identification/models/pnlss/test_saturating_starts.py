@@ -8,8 +8,7 @@ import scipy.linalg
 
 from identification import Features, IdentificationError, PnlssModel, pnlss_errors
 from identification.experiments.experiment import Experiment
-from identification.models.pnlss.linear_residual import linear_residual
-from identification.models.pnlss.saturating_starts import saturating_starts
+from identification.models.pnlss.saturating_starts import linear_residual, saturating_starts
 from tests.identification.models.pnlss.multisines import (
     RATE_HZ,
     channels,

@@ -165,7 +165,7 @@ def test_derivatives_by_shapes_of_an_element_at_a_place(tested):
 
     (one, *_), _ = tested
     linear = linear_start(modes(), one, 2)
-    place = linear.place_of(("tip", "drive"))
+    place = linear.output_selector(("tip", "drive"))
     np.testing.assert_array_equal(place, [-1.0, 1.0])
     element = NonlinearElement(
         direction=place @ linear.output_shapes,

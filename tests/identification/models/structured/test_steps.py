@@ -11,7 +11,7 @@ from identification import IdentificationError
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.kernels import damping_at, spring_at
 from identification.models.structured.laws import Masing, PolynomialDamper, PolynomialSpring
-from identification.models.structured.model import room_for
+from identification.models.structured.model import workspace_for
 from identification.models.structured.nudging import ends_of_steps
 from identification.models.structured.parameters import Parameters
 from identification.models.structured.steps import end_step, run, take_input, take_step
@@ -36,7 +36,7 @@ def energy(system, state):
 def test_over_every_step_the_energy_changes_by_work_less_damping(rms_n):
     model = beam(support_n_m=0.0)
     system, u = model.system, multisine(rms_n, 1)[:, :400]
-    room, ends, state = room_for(system), ends_of_steps(u, model.steps), np.zeros(system.size)
+    room, ends, state = workspace_for(system), ends_of_steps(u, model.steps), np.zeros(system.size)
     q, v, r = state[:2], state[2:4], state[5:]
     used = []
     for row in range(len(ends) - 1):
@@ -206,7 +206,7 @@ def _with_limits(model, start, u):
     limits[limited] = frozen.limits[limited]
     system = system._replace(tables=system.tables._replace(limits=limits))
     states = np.zeros((u.shape[1], 3, 2))
-    run(system, room_for(system), ends_of_steps(u, model.steps), np.zeros(system.size), states)
+    run(system, workspace_for(system), ends_of_steps(u, model.steps), np.zeros(system.size), states)
     return outputs_of(model, u, states)
 
 

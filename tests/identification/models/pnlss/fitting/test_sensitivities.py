@@ -5,13 +5,32 @@ import pytest
 
 from identification import Experiment, PnlssModel
 from identification.models.pnlss.features import FUNCTIONS
+from identification.models.pnlss.fitting.blocks import Blocks, Derivatives
 from identification.models.pnlss.fitting.frequency_lines import with_lines
-from identification.models.pnlss.fitting.normal_equations import jacobian, normal_equations
+from identification.models.pnlss.fitting.normal_equations import normal_equations
 from identification.models.pnlss.fitting.parameters import Parameters
 from identification.models.pnlss.fitting.records import Record, records_of, simulated
-from identification.models.pnlss.fitting.settings import FitSettings
+from identification.models.pnlss.fitting.result import FitSettings
 from tests.identification.models.pnlss.systems import experiment, nonlinear_system, periodic_experiment
 from vibrolock.arrays import Float
+
+
+def jacobian(parameters: Parameters, vector: Float, record: Record, weights: Float) -> Float:
+    """float[n_outputs, counted, n_parameters]: full Jacobian of one experiment in time, for small problems and checks."""
+    system, begins = parameters.system(vector), parameters.initial_states(vector)
+    n, own = len(system.state), system.output.shape[1]
+    x, at = np.zeros(n) if record.place is None else begins[record.place], 0
+    onto = parameters.onto(parameters.begin_derivatives(record.place))
+    whole = np.zeros((len(weights), len(record.u) - record.counted_from, parameters.count))
+    of: Derivatives = "parameters" if record.place is None else "all"
+    blocks = Blocks(system, record, weights, x, (0, len(record.u)), of)
+    for _ in blocks:
+        part = whole[:, at : at + len(blocks.rows)]
+        at += len(blocks.rows)
+        part[:, :, : parameters.shared] = np.moveaxis(blocks.rows[:, n:] @ onto[:, :-1], 1, 0)
+        for output, by in enumerate(weights):
+            part[output, :, parameters.own(output)] = by * blocks.q[:, :own]
+    return whole
 
 
 def record(system: PnlssModel, one: Experiment) -> Record:

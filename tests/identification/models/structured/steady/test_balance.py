@@ -7,7 +7,7 @@ from identification import IdentificationError, harmonic_response, steady_state
 from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.drives import Coupled, Sine
 from identification.models.structured.balance import StructuredBalance, along_period
-from identification.models.structured.model import room_for
+from identification.models.structured.model import workspace_for
 from identification.models.structured.steps import run
 from tests.identification.models.pnlss.steady.oscillators import shaker
 from tests.identification.models.structured.steady.beams import beam, friction, settled, smooth
@@ -127,7 +127,7 @@ def test_multipliers_are_those_of_a_simulated_period():
     def after(state):
         system, full = model.system, np.zeros(model.system.size)
         full[:4] = state
-        run(system, room_for(system), u, full, np.zeros((samples, 3, 2)))
+        run(system, workspace_for(system), u, full, np.zeros((samples, 3, 2)))
         return full[:4]
 
     units = np.array([1.0, 1.0, w, w])
