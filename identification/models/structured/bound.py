@@ -20,6 +20,7 @@ rate lambda.
 
 from dataclasses import dataclass
 from itertools import pairwise, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -98,8 +99,7 @@ def bound_of(model: StructuredModel, force_rms_n: float) -> Bound:
     )
 
 
-@dataclass(frozen=True)
-class _Spring:
+class _Spring(NamedTuple):
     """Quadratic limits of a spring: ``x f >= s x^2 - kappa``, ``low x^2/2 - below <= P <= high x^2/2 + above``."""
 
     s: float
@@ -151,61 +151,50 @@ def _with(
 ) -> tuple[float, float, Float] | None:
     """Return W with the lower potential added, the rate, and the quadratic form that it bounds; None if no bound follows."""
     n, h, tables, phi = len(system.omega), system.step_s, system.tables, system.phi
-    b = system.b[:, 0]
-    damping = 2.0 * system.zeta * system.omega
-    stiffness = np.diag(system.omega**2)
-    eps = eps_share * float(damping.min())
+    b, eye, zero = system.b[:, 0], np.eye(n), np.zeros((n, n))
+    rates = 2.0 * system.zeta * system.omega
+    damping, stiffness = np.diag(rates), np.diag(system.omega**2)
+    eps = eps_share * float(rates.min())
     springs = [_spring(tables, e, slope_share) for e in range(len(phi))]
-    most_damping = tables.dampers.max(axis=1) if len(phi) else np.zeros(0)
+    slope, kappa, steepest, middle, half, low, below, high, above = np.reshape(springs, (-1, len(_Spring._fields))).T
+    most_damping = tables.dampers.max(axis=1, initial=0.0)
     strength = np.array([tables.sliders[a:b, 1].sum() for a, b in pairwise(tables.first)])
     static = 1.0 / np.maximum(np.sum((phi / system.omega) ** 2, axis=1), 1e-300)
-    a_form, b_form = np.diag(damping) - eps * np.eye(n), stiffness.copy()
-    constant = 0.0
-    for e, spring in enumerate(springs):
-        outer = np.outer(phi[e], phi[e])
-        tau = 0.02 * static[e] if strength[e] else 0.0
-        a_form -= eps * (spring.steepest + max(-spring.s, 0.0)) * h**2 / 12.0 * outer
-        b_form += (spring.s - tau - 0.25 * eps * most_damping[e]) * outer
-        constant += eps * (spring.kappa + (strength[e] ** 2 / (4.0 * tau) if tau else 0.0))
+    tau = np.where(strength > 0.0, 0.02 * static, 0.0)
+
+    def form(weights: Float) -> Float:
+        return np.asarray((phi.T * weights) @ phi)
+
+    a_form = damping - eps * eye - form(eps * (steepest + np.maximum(-slope, 0.0)) * h**2 / 12.0)
+    b_form = stiffness + form(slope - tau - 0.25 * eps * most_damping)
+    joints = strength > 0.0
+    constant = eps * float(np.sum(kappa) + np.sum(strength[joints] ** 2 / (4.0 * tau[joints])))
     if np.linalg.eigvalsh(a_form)[0] <= 0.0 or np.linalg.eigvalsh(b_form)[0] <= 0.0:
         return None
-    zero = np.zeros((n, n))
     s_form = np.block([[a_form, zero], [zero, eps * b_form]])
     g = (b @ np.linalg.solve(a_form, b) + eps * b @ np.linalg.solve(b_form, b)) / (4.0 * theta)
 
     # the end of the step: a linear map, and what is left of the elements and the force
-    eye = np.eye(n)
     to_q = np.hstack([0.5 * h * eye, eye])
-    by_rate, by_place = np.diag(damping), stiffness.copy()
-    for e, spring in enumerate(springs):
-        outer = np.outer(phi[e], phi[e])
-        by_rate = by_rate + 0.5 * most_damping[e] * outer
-        by_place = by_place + spring.middle * outer
+    by_rate, by_place = damping + form(0.5 * most_damping), stiffness + form(middle)
     to_v = np.hstack([eye - 0.5 * h * by_rate, -0.5 * h * by_place])
     rest = (1.0 + 1.0 / _SPLIT) * 0.25 * h**2 * (len(phi) + 1.0)
+    sizes = rest * np.sum(phi**2, axis=1)
     mean_square = (1.0 + _SPLIT) * to_v.T @ to_v
-    nu_v, fixed_v = rest * float(b @ b), 0.0
-    high = stiffness + eps * np.diag(damping)
-    for e, spring in enumerate(springs):
-        outer, size = np.outer(phi[e], phi[e]), float(phi[e] @ phi[e])
-        mean_square[n:, n:] += rest * size * 2.5 * spring.half**2 * outer
-        rate = 0.625 * spring.half**2 * h**2 + most_damping[e] ** 2
-        mean_square[:n, :n] += rest * size * rate * outer
-        fixed_v += rest * size * 4.0 * strength[e] ** 2
-        high = high + spring.high * outer
+    mean_square[n:, n:] += form(2.5 * sizes * half**2)
+    mean_square[:n, :n] += form(sizes * (0.625 * half**2 * h**2 + most_damping**2))
     # eps q.v <= eps (v.v/(2 f) + f q.q/2), f the lowest frequency
     f = float(system.omega.min())
-    w_form = 0.5 * (1.0 + eps / f) * mean_square + 0.5 * to_q.T @ (high + eps * f * eye) @ to_q
+    potential = stiffness + eps * damping + form(high)
+    w_form = 0.5 * (1.0 + eps / f) * mean_square + 0.5 * to_q.T @ (potential + eps * f * eye) @ to_q
     slider_energy = float(np.sum(tables.sliders[:, 1] ** 2 / np.maximum(2.0 * tables.sliders[:, 0], 1e-300)))
-    fixed = 0.5 * (1.0 + eps / f) * fixed_v + sum(spring.above for spring in springs) + slider_energy
-    nu = 0.5 * (1.0 + eps / f) * nu_v
+    fixed = 2.0 * (1.0 + eps / f) * float(sizes @ strength**2) + float(np.sum(above)) + slider_energy
+    nu = 0.5 * (1.0 + eps / f) * rest * float(b @ b)
     factor = np.linalg.inv(np.linalg.cholesky(s_form))
     mu = float(np.linalg.eigvalsh(factor @ w_form @ factor.T)[-1])
     rate = (1.0 - theta) / mu
     largest = float((g / rate + nu) * force**2 + constant / rate + fixed)
-    quadratic = 0.5 * np.block([[eye, eps * eye], [eps * eye, stiffness + eps * np.diag(damping)]])
-    for e, spring in enumerate(springs):
-        quadratic[n:, n:] += 0.5 * spring.low * np.outer(phi[e], phi[e])
+    quadratic = 0.5 * np.block([[eye, eps * eye], [eps * eye, stiffness + eps * damping + form(low)]])
     if np.linalg.eigvalsh(quadratic)[0] <= 0.0:
         return None
-    return largest + sum(spring.below for spring in springs), rate, quadratic
+    return largest + float(np.sum(below)), rate, quadratic

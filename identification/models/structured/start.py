@@ -14,12 +14,7 @@ from identification.models.structured.element_trials import ElementPlan
 from identification.models.structured.laws import Damper, Joint, Law, Spring
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import LOWEST, modal_spectra
-from identification.models.structured.regression import (
-    Regression,
-    bounded_regression,
-    law_force,
-    with_regression,
-)
+from identification.models.structured.regression import Regression, bounded_regression, law_force, with_regression
 from vibrolock.arrays import Complex, Float
 
 _HIGHEST = 6.0
