@@ -4,7 +4,7 @@ The reaction is ``F = P Y``. If the output Y is the acceleration of the drive po
 frequency responses. In time, a double integrator would drift with any static component, and it would destabilise a model that
 is inaccurate below the frequencies of its training. No causal filter is exact within a band and zero below it, because the
 gain of a filter determines its phase (Bode 1945). The filter P^ chosen here is stable with the model and close to P. The
-remainder P - P^ is added in passes over the whole run (`coupled.run`). Each pass multiplies the error by
+remainder P - P^ is added in passes over the whole run (`passes`). Each pass multiplies the error by
 
     (P - P^) G / (1 - P G),    G the model's linear part,
 

@@ -48,7 +48,7 @@ def structured_mode(
     fundamental; the modal amplitude refers to the small vibrations (`StructuredModel.linearised`).
 
     Standard errors are those of frequency and damping at the same amplitude, from the covariance of the fit, to first order
-    (`uncertainty`). They are NaN for a model without its fit, and contain neither the misfit of the
+    (`std_of`). They are NaN for a model without its fit, and contain neither the misfit of the
     laws nor that of the modes.
 
     Raises `IdentificationError` if ``force_n`` is needed because the model does not know its training data, and as

@@ -129,8 +129,8 @@ def test_a_stretch_of_a_run_that_leaves_all_bounds_ends_there():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"sample_rate_hz": 200.0}, {"says": "sampled-at-hz-the-model-at"}),
-        ({"input_channels": (Channel("voltage", "monitor", "V"),)}, {"says": "inputs-are-voltage-the-model-force"}),
+        ({"sample_rate_hz": 200.0}, {"says": "sampled-at-hz-the-model-is-2"}),
+        ({"input_channels": (Channel("voltage", "monitor", "V"),)}, {"says": "inputs-are-voltage-the-model-has-force"}),
     ],
 )
 def test_experiments_of_other_rates_or_channels_are_refused(changes, said):
