@@ -278,7 +278,7 @@ def test_no_force_of_a_hundred_times_the_range_makes_a_run_unbounded(seed):
             {"damping_ratio": [0.01, 0.0]},
             {"field": "damping_ratio", "value": [0.01, 0.0], "allowed": "numbers above 0: the model must stay bounded"},
         ),
-        ({"input_shapes": [[1.0]]}, {"says": "shape-7", "field": "input_shapes", "allowed": "2, 1"}),
+        ({"input_shapes": [[1.0]]}, {"says": "shape-7", "field": "input_shapes", "allowed": "(2, 1)"}),
         (
             {"frequency_hz": [25.0, 1000.0]},
             {"field": "frequency_hz", "value": [25.0, 1000.0], "allowed": "below 1000, half of the rate of the steps"},
