@@ -106,6 +106,31 @@ def memory_of(bench: Bench) -> BenchMemory:
         return BenchMemory(trip=RememberedTrip(now(), text, ""))
 
 
+def known_scale(
+    bench: Bench, identity: Mapping[str, str], given: CheckedScale | None, *, virtual: bool
+) -> tuple[CheckedScale | None, str]:
+    """Return the scale of the last check of the bench, or the ``given`` one, and why the scale is unproven if there is none.
+
+    Nothing is remembered of a virtual bench, and nothing is said of it. A check of other channels or another device does not
+    count. ``identity`` is what the driver says of its device.
+    """
+    if given is not None or virtual:
+        return given, ""
+    check = memory_of(bench).check
+    if check is None:
+        why = "the bench was never checked"
+    elif check.fingerprint != fingerprint(bench, identity):
+        why = "the last check was of other channels, another rate, another driver or another device"
+    elif check.scale is None:
+        why = "the last check kept no numbers of it"
+    else:
+        return check.scale, ""
+    return None, (
+        f"the scale of force and motion is unproven: {why}; a sensitivity that is wrong by a factor would not be seen "
+        "(run `rig check` with this bench)"
+    )
+
+
 class _Changes(TypedDict, total=False):
     check: RememberedCheck | None
     trip: RememberedTrip | None

@@ -60,3 +60,15 @@ def calibration_remarks(bench: Bench, today: date) -> list[str]:
         for channel in bench.channels
         if channel.calibration_due and date.fromisoformat(channel.calibration_due) < today
     ]
+
+
+def unproven_phase(bench: Bench, *, virtual: bool) -> str:
+    """Return why nothing proves the phase of the drive sensor; an empty string if something does, or on a virtual bench."""
+    shapes = [channel for channel in bench.channels if channel.role == "response" and channel.mode_shape]
+    if virtual or (shapes and bench.specimen.drive_mode_shape is not None):
+        return ""
+    drive = bench.channels[bench.index_of("drive")].name
+    return (
+        f"the phase of {drive} is unproven: the bench has no response with a mode_shape to compare it with, so a delay of its "
+        "conditioner would not be seen"
+    )

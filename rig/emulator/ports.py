@@ -53,15 +53,6 @@ def driver_options_of(settings: EmulatorSettings, path: str) -> Table:
     return {"interface": "slcan", "channel": path, **_can_options(settings)}
 
 
-def largest_block(settings: EmulatorSettings) -> int | None:
-    """Largest number of samples in a block that the frames of a bus can number; None on a serial line."""
-    if settings.wire == "serial":
-        return None
-    from rig.wire.can.protocol import protocol
-
-    return protocol(len(settings.bench.channels), settings.fd, settings.node).shape.largest_block
-
-
 def _can_link(settings: EmulatorSettings, bus: "FrameBus") -> Link:
     from rig.wire.can.link import CanLink
 

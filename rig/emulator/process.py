@@ -14,7 +14,7 @@ from rig.emulator.faults import Faults
 from rig.emulator.firmware import started
 from rig.emulator.parameters import LARGEST_BLOCK, described
 from rig.emulator.plant import OutputLog, VirtualPlant, Wiring
-from rig.emulator.ports import device_end, driver_options_of, largest_block
+from rig.emulator.ports import device_end, driver_options_of
 from rig.emulator.settings import EmulatorSettings
 from rig.system.privileges import prepare
 
@@ -111,8 +111,12 @@ def _run_firmware(
     scheduling = _scheduling(settings)  # before it starts, for a child inherits it
     with started(settings, plant) as firmware:
         _when_pressed(firmware.press_emergency_stop)
-        options, most = driver_options_of(settings, firmware.port), largest_block(settings) or LARGEST_BLOCK
-        when_ready(Ready(settings.wire, options, settings.lockstep, scheduling, min(most, LARGEST_BLOCK)))
+        options, most = driver_options_of(settings, firmware.port), LARGEST_BLOCK
+        if settings.wire == "can":
+            from rig.wire.can.protocol import shape_of
+
+            most = min(most, shape_of(len(settings.bench.channels), settings.fd).largest_block)
+        when_ready(Ready(settings.wire, options, settings.lockstep, scheduling, most))
         if not firmware.serve(should_end):
             raise firmware.failure()
         return firmware.end()

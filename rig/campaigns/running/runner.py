@@ -11,11 +11,10 @@ from typing import cast
 from pydantic import TypeAdapter, ValidationError
 
 import vibrolock
-from rig.arming.bench_memory import RememberedTrip, memory_of, now, remember
+from rig.arming.bench_memory import RememberedTrip, known_scale, memory_of, now, remember
 from rig.arming.checked_scale import CheckedScale
-from rig.arming.known_scale import known_scale, unproven_phase
 from rig.arming.rehearsed import Rehearsed, rehearsal_facts
-from rig.arming.run_facts import calibration_remarks
+from rig.arming.run_facts import calibration_remarks, unproven_phase
 from rig.arming.run_options import Progress, RunOptions
 from rig.bench import Bench
 from rig.bench.user_code import imported_code, refuse_code
