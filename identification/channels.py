@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 from identification.errors import IdentificationError
@@ -53,20 +54,11 @@ class Channel:
             raise IdentificationError(
                 where=f"channel '{self.name}'", field="role", value=self.role, allowed=get_args(Role)
             )
+        refused = partial(IdentificationError, where=f"channel '{self.name}'", field="unit", value=self.unit)
         if self.role == "force" and self.unit not in _FORCE_UNITS:
-            raise IdentificationError(
-                "a force is given in N (V or 1 if there is no better unit)",
-                where=f"channel '{self.name}'",
-                field="unit",
-                value=self.unit,
-            )
+            raise refused("a force is given in N (V or 1 if there is no better unit)")
         if self.role in ("drive", "response") and self.unit not in _MOTION_OF_UNIT:
-            raise IdentificationError(
-                "a motion is in m, m/s or m/s2 (V or 1 if there is no better unit)",
-                where=f"channel '{self.name}'",
-                field="unit",
-                value=self.unit,
-            )
+            raise refused("a motion is in m, m/s or m/s2 (V or 1 if there is no better unit)")
 
     @property
     def motion(self) -> Motion:

@@ -6,11 +6,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from simulators.part import Part, Positive
+from simulators.part import NotNegative, Part, Positive
 from simulators.shipped import GEOMETRY, shaker_values
 from vibrolock.errors import InputError
-
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 YOUNGS_MODULUS_PA = {"steel": 200e9, "piano-wire": 190e9, "aluminium": 68.9e9, "nylon": 2.76e9}
 """Young's modulus by material: steel (A36), aluminium (6061-T6) and nylon (6-6) of a textbook's table, 29, 10 and 0.4 million

@@ -9,6 +9,7 @@ from vibrolock.described import Described
 Item = TypeVar("Item")
 
 Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 Several = Annotated[tuple[Item, ...], Field(strict=False)]
 """A tuple that may also be given as a list, as in TOML."""
 

@@ -12,11 +12,10 @@ import numpy as np
 
 from identification.decays.local_fits import Rates, Series, rates_at
 from identification.errors import IdentificationError
+from identification.slow_flows.fits import neighbours
 from vibrolock.arrays import Complex, Float
 
 _HALF_WIDTHS = (0.12, 0.2, 0.32, 0.5, 0.75, 1.1)  # in ln(amplitude)
-_NEIGHBOURS = 2
-"""Levels on either side over which an error is smoothed. Chosen."""
 _COLUMNS = 11
 """Columns of the table of fits at all levels."""
 _WINDOW_SHARE = 0.2
@@ -183,9 +182,7 @@ def _local(series: Series, load: Complex, centre: float, early: float, late: flo
 def _pooled(values: Float, by: Callable[..., Any]) -> Float:
     """float[n]: ``by`` over each level and its neighbours, those without a fit left out."""
     out = np.full(values.size, np.nan)
-    for number in range(values.size):
-        near = values[max(0, number - _NEIGHBOURS) : number + _NEIGHBOURS + 1]
-        near = near[np.isfinite(near)]
-        if near.size and np.isfinite(values[number]):
-            out[number] = by(near)
+    for number, near in enumerate(neighbours(values.size)):
+        if np.isfinite(values[number]):
+            out[number] = by(values[near][np.isfinite(values[near])])
     return out

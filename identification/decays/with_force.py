@@ -9,9 +9,6 @@ damping is the difference of two rates, that of the decay and that of the excite
 ``drive_mode_shape^2`` or of the gain of the force against that of the motion shows in it multiplied by their ratio.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +16,7 @@ from identification.channels import find_role
 from identification.decays.result import DecayMode
 from identification.errors import IdentificationError
 from identification.slow_flows.continuous import fit_around
-from identification.slow_flows.fits import noise_variances
+from identification.slow_flows.fits import neighbours, noise_variances
 from identification.slow_flows.slow_flow import SlowFlow
 from vibrolock.arrays import Complex, Float
 
@@ -28,8 +25,6 @@ _DEGREE, _HIGHER_DEGREE = 1, 2
 """Degree of a local polynomial, and of the one whose difference bounds the curvature within the fit. Chosen."""
 _FEWEST_INSTANTS = 5
 """Fewest instants of a decay. Chosen."""
-_NEIGHBOURS = 2
-"""Levels on either side over which an error is smoothed. Chosen."""
 _CURVATURE = 2.0  # bound of the error over the difference between fits of two degrees
 _WORST = 0.25
 """Relative standard error of the damping above which a level is left out."""
@@ -38,17 +33,6 @@ _WINDOW_PERIODS = 1.5
 _UNKNOWN, _RISEN = 0.2, 1.2
 """Standard error of the damping at an instant over the rate of decay, and a rise of the amplitude, at which a decay ends."""
 _MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees of freedom
-
-
-@dataclass(frozen=True, eq=False)
-class _Level:
-    amplitude_m: float
-    stiffness: float
-    damping: float
-    stiffness_std: float
-    damping_std: float
-    apart: tuple[float, float]
-    """Differences of stiffness and damping to the fit of the other degree, beyond noise, squared; may be below zero."""
 
 
 def decay_with_force(
@@ -85,17 +69,10 @@ def decay_with_force(
     decay = _decay(flow, start_s, stop_s, quiet)
     size = decay.amplitude_m
     levels = np.geomspace(size[0], size[-1], number + 2)[1:-1]
-    tables = [_at_width(decay, levels, width, quiet) for width in _HALF_WIDTHS]
-    errors = np.array([_pooled(table) for table in tables])  # widths by levels by (k, c)
-    cost = np.array(
-        [
-            [
-                np.inf if one is None else np.hypot(one.damping_std, bound[1]) / abs(one.damping)
-                for one, bound in zip(table, bounds, strict=True)
-            ]
-            for table, bounds in zip(tables, errors, strict=True)
-        ]
-    )
+    tables = np.array([_at_width(decay, levels, width, quiet) for width in _HALF_WIDTHS])  # widths by levels by columns
+    bounds = np.array([_pooled(table[:, 4:]) for table in tables])
+    cost = np.hypot(tables[..., 3], bounds[..., 1]) / np.abs(tables[..., 1])
+    cost[~np.isfinite(cost)] = np.inf
     keep = np.flatnonzero(cost.min(axis=0) < _WORST)
     if not keep.size:
         raise IdentificationError(
@@ -103,10 +80,9 @@ def decay_with_force(
             "or take the exciter off",
             field="samples",
         )
-    best = cost.argmin(axis=0)
-    chosen = [found for n in keep if (found := tables[best[n]][n]) is not None]
-    bounds = np.array([errors[best[n], n] for n in keep])
-    return _mode(decay, chosen, bounds, drive_mode_shape_std, residual_std_m_n)
+    best = cost.argmin(axis=0)[keep]
+    chosen = tables[best, keep, :4], bounds[best, keep]
+    return _mode(decay, levels[keep], *chosen, drive_mode_shape_std, residual_std_m_n)
 
 
 def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -> SlowFlow:
@@ -131,46 +107,43 @@ def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -
     return rest.select(np.arange(size.size) < count)
 
 
-def _at_width(decay: SlowFlow, levels: Float, width: float, quiet: float) -> list[_Level | None]:
+def _at_width(decay: SlowFlow, levels: Float, width: float, quiet: float) -> Float:
+    """float[n, 6]: stiffness, damping, their standard errors, and what they differ by to the fit of the other degree.
+
+    These differences are squared, beyond noise, and may be below zero. NaN where there are too few instants.
+    """
     fits = [
         [fit_around(decay, float(np.log(level)), width, degree) for degree in (_DEGREE, _HIGHER_DEGREE)]
         if np.count_nonzero(np.abs(np.log(decay.amplitude_m / level)) < width) >= _FEWEST_INSTANTS
         else None
         for level in levels
     ]
-    out: list[_Level | None] = []
-    for n, (level, both) in enumerate(zip(levels, fits, strict=True)):
+    out = np.full((levels.size, 6), np.nan)
+    for row, both, near in zip(out, fits, neighbours(levels.size), strict=True):
         if both is None:
-            out.append(None)
             continue
-        near = [some[1] for some in fits[max(0, n - _NEIGHBOURS) : n + _NEIGHBOURS + 1] if some is not None]
-        noise = np.maximum(noise_variances(near), [quiet, 0.0])
+        noise = np.maximum(noise_variances([some[1] for some in fits[near] if some is not None]), [quiet, 0.0])
         (k_std, c_std), (k_further, c_further) = (fit.standard_errors(noise) for fit in both)
-        apart = (
-            (both[1].stiffness - both[0].stiffness) ** 2 - max(k_further**2 - k_std**2, 0.0),
-            (both[1].damping - both[0].damping) ** 2 - max(c_further**2 - c_std**2, 0.0),
-        )
-        out.append(_Level(float(level), both[0].stiffness, both[0].damping, k_std, c_std, apart))
+        row[:4] = both[0].stiffness, both[0].damping, k_std, c_std
+        row[4] = (both[1].stiffness - both[0].stiffness) ** 2 - max(k_further**2 - k_std**2, 0.0)
+        row[5] = (both[1].damping - both[0].damping) ** 2 - max(c_further**2 - c_std**2, 0.0)
     return out
 
 
-def _pooled(table: Sequence[_Level | None]) -> Float:
+def _pooled(square: Float) -> Float:
     """float[n, 2]: bounds of the systematic errors of stiffness and damping, averaged over neighbouring levels."""
-    square = np.array([(np.nan, np.nan) if one is None else one.apart for one in table])
     out = np.full(square.shape, np.nan)
-    for n in range(len(table)):
-        near = square[max(0, n - _NEIGHBOURS) : n + _NEIGHBOURS + 1]
-        near = near[np.isfinite(near[:, 0])]
-        if near.size:
-            out[n] = _CURVATURE * np.sqrt(np.maximum(near.mean(axis=0), 0.0))
+    for row, near in zip(out, neighbours(len(square)), strict=True):
+        known = square[near][np.isfinite(square[near, 0])]
+        if known.size:
+            row[:] = _CURVATURE * np.sqrt(np.maximum(known.mean(axis=0), 0.0))
     return out
 
 
-def _mode(decay: SlowFlow, levels: Sequence[_Level], bounds: Float, shape_std: float, residual_std: float) -> DecayMode:
-    amplitude, stiffness, damping = (
-        np.array([getattr(one, name) for one in levels]) for name in ("amplitude_m", "stiffness", "damping")
-    )
-    std = np.array([(one.stiffness_std, one.damping_std) for one in levels])
+def _mode(
+    decay: SlowFlow, amplitude: Float, fits: Float, bounds: Float, shape_std: float, residual_std: float
+) -> DecayMode:
+    stiffness, damping, std = fits[:, 0], fits[:, 1], fits[:, 2:]
     omega = np.sqrt(stiffness)
     falling, growth = np.log(decay.amplitude_m), decay.growth_1_s
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -71,6 +72,7 @@ class Experiment:
         for name in ("input_channels", "output_channels"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         where = f"experiment '{self.name}', " if self.name else ""
+        refused = partial(IdentificationError, where=where)
         for name, channels in (("inputs", self.input_channels), ("outputs", self.output_channels)):
             array = finite_array(f"{where}{name}", getattr(self, name), np.float64, 2)
             if array.shape[0] != len(channels) or not len(channels):
@@ -80,47 +82,26 @@ class Experiment:
             object.__setattr__(self, name, array)
         n = self.inputs.shape[1]
         if self.outputs.shape[1] != n:
-            raise IdentificationError(f"have {self.outputs.shape[1]} samples, inputs {n}", where=where, field="outputs")
+            raise refused(f"have {self.outputs.shape[1]} samples, inputs {n}", field="outputs")
         if np.ndim(self.sample_rate_hz):
-            raise IdentificationError(
-                f"has shape {np.shape(self.sample_rate_hz)}",
-                where=where,
-                field="sample_rate_hz",
-                allowed="one number",
-                hint="resample what was sampled at unequal steps",
-            )
+            shape, hint = np.shape(self.sample_rate_hz), "resample what was sampled at unequal steps"
+            raise refused(f"has shape {shape}", field="sample_rate_hz", allowed="one number", hint=hint)
         positive(f"{where}sample_rate_hz", self.sample_rate_hz, "Hz")
         positive(f"{where}weight", self.weight)
         if self.initial_state not in get_args(InitialState):
-            raise IdentificationError(
-                where=where, field="initial_state", value=self.initial_state, allowed=get_args(InitialState)
-            )
+            raise refused(field="initial_state", value=self.initial_state, allowed=get_args(InitialState))
         if not 0 <= self.counted_from < n:
-            raise IdentificationError(
-                where=where,
-                field="counted_from",
-                value=self.counted_from,
-                allowed=f"0 to {n - 1}, one sample at least must count",
-            )
+            allowed = f"0 to {n - 1}, one sample at least must count"
+            raise refused(field="counted_from", value=self.counted_from, allowed=allowed)
         if self.period_samples < 0 or (self.period_samples and self.counted % self.period_samples):
-            raise IdentificationError(
-                f"the {self.counted} samples that count are no whole number of periods",
-                where=where,
-                field="period_samples",
-                value=self.period_samples,
-            )
+            reason = f"the {self.counted} samples that count are no whole number of periods"
+            raise refused(reason, field="period_samples", value=self.period_samples)
         lines = (len(self.outputs), (self.period_samples + 1) // 2 - 1)
         if self.output_noise is not None and self.period_samples and np.shape(self.output_noise) != lines:
-            raise IdentificationError(
-                f"shape {np.shape(self.output_noise)}", where=where, field="output_noise", allowed=lines
-            )
+            raise refused(f"shape {np.shape(self.output_noise)}", field="output_noise", allowed=lines)
         if self.excited_hz is not None and not 0.0 <= self.excited_hz[0] < self.excited_hz[1]:
-            raise IdentificationError(
-                where=where,
-                field="excited_hz",
-                value=self.excited_hz,
-                allowed="two rising frequencies, none below zero",
-            )
+            allowed = "two rising frequencies, none below zero"
+            raise refused(field="excited_hz", value=self.excited_hz, allowed=allowed)
 
     @classmethod
     def periodic(

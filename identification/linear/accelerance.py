@@ -146,14 +146,12 @@ def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weightin
     def scaled(covariance: Complex) -> Complex:
         return np.asarray(factor[:, :, None] * covariance * np.conj(factor[:, None, :]))
 
-    return WeightedResponses(
-        plain.frequency_hz,
-        plain.value * factor.reshape(plain.value.shape),
-        None if plain.covariance is None else scaled(plain.covariance),
-        scaled(plain.smooth),
-        plain.kind,
-        None if plain.deviations is None else plain.deviations * factor[:, None],
-        plain.decay_rate_1_s,
+    return replace(
+        plain,
+        value=plain.value * factor.reshape(plain.value.shape),
+        covariance=None if plain.covariance is None else scaled(plain.covariance),
+        smooth=scaled(plain.smooth),
+        deviations=None if plain.deviations is None else plain.deviations * factor[:, None],
     )
 
 

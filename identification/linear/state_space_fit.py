@@ -72,15 +72,10 @@ def fit_state_space(
 
     Parameters
     ----------
-    responses
-        Responses of one or several inputs and outputs, with their covariance if it is known.
+    responses, sample_rate_hz, weighting
+        As for `subspace`.
     start
         Stable initial model, for instance from `subspace`.
-    sample_rate_hz
-        Sample rate of the model, ``z = exp(2 pi i f / sample_rate_hz)``.
-    weighting
-        Covariance that weights the lines: ``total``, ``noise``, ``relative`` (none), or the first of these that is known
-        (``auto``).
     iterations
         Largest number of iterations.
     """

@@ -103,14 +103,8 @@ def demodulate(
 
     Parameters
     ----------
-    theta_rad
-        float[n], phase of the oscillator at the instant that each sample was measured, rising; wrapped or not.
-    samples
-        float[n_channels, n], in the unit of each channel, SI.
-    channels
-        The channels, one per row of ``samples``; exactly one of role ``force``.
-    sample_rate_hz
-        Samples per second.
+    theta_rad, samples, channels, sample_rate_hz
+        As for `periodic_vibration`; exactly one channel of role ``force``.
     periods
         Number of periods P of each of the two means. One period resolves fast changes best; more periods leave less noise,
         but raise a narrow minimum that is passed fast.

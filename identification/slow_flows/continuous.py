@@ -15,7 +15,7 @@ from identification.backbones import Backbone
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
 from identification.nonlinear.phase_resonance import nonlinear_mode
-from identification.slow_flows.fits import LocalFit, noise_variances
+from identification.slow_flows.fits import LocalFit, neighbours, noise_variances
 from identification.slow_flows.resonance import Amplitudes, amplitudes_at, fit_at, resonant_vibration
 from identification.slow_flows.signals import WINDOW_VARIANCE
 from identification.slow_flows.slow_flow import SlowFlow
@@ -29,8 +29,6 @@ _NOISE_SPAN = 1.0  # in the logarithm of the amplitude
 _MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees of freedom
 _FEWEST_INSTANTS = 8
 """Fewest instants in a local fit. Chosen."""
-_NEIGHBOURS = 2
-"""Levels on either side over which an error is smoothed. Chosen."""
 _WIDEN = 1.25
 """Factor by which a window with too few instants grows. Chosen."""
 _SLOPE_WIDTH = 0.25  # in the logarithm of the amplitude; derivatives of the stiffness need more instants than itself
@@ -133,8 +131,7 @@ def continuous_backbone(
         [fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), own, strict=True)]
         for flow, own in zip((up, down), widths, strict=True)
     ]
-    near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(levels.size)]
-    noise = [noise_variances([fit for fits in first for fit in fits[some]]) for some in near]
+    noise = [noise_variances([fit for fits in first for fit in fits[near]]) for near in neighbours(levels.size)]
     sensors = _sensor_noise(up, down)
     ramps = [
         _along(flow, levels, own, fits, noise, sensors, accuracy)
@@ -305,8 +302,7 @@ def _beyond_noise(values: Float, std: Float) -> Float:
     It is the RMS over neighbouring levels, because the error is not smaller where the two curves happen to cross.
     """
     square = 0.25 * (values[0] - values[1]) ** 2 - 0.25 * np.sum(std**2, axis=0)
-    near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(square.size)]
-    return np.asarray(np.sqrt(np.maximum([np.mean(square[some]) for some in near], 0.0)))
+    return np.asarray(np.sqrt(np.maximum([np.mean(square[near]) for near in neighbours(square.size)], 0.0)))
 
 
 def _with_systematic(mode: NonlinearMode, further: dict[str, Float]) -> NonlinearMode:

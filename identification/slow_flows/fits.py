@@ -43,29 +43,14 @@ class LocalFit:
         return float(k), float(c)
 
 
-def local_fit(
-    stiffness: Complex, rate: Complex, size: Float, periods: Float, place: Float, weight: Float, degree: int = 1
-) -> LocalFit:
-    """Fit stiffness and damping by least squares over n instants.
-
-    Parameters
-    ----------
-    stiffness, rate, size
-        complex[n], complex[n], float[n]: g (1/s^2), b (1/s) and ``|X|``.
-    periods
-        float[n], time in periods, for the overlap of the windows.
-    place, weight
-        float[n], variable of the polynomials k and c, and weights of the instants.
-    degree
-        Degree of these polynomials.
-    """
-    return local_fits(stiffness[None], rate[None], size[None], periods[None], place[None], weight[None], degree)[0]
-
-
 def local_fits(
     stiffness: Complex, rate: Complex, size: Float, periods: Float, place: Float, weight: Float, degree: int = 1
 ) -> list[LocalFit]:
-    """Make m fits like `local_fit` at once: complex[m, n] and float[m, n], one row a fit."""
+    """Make m fits of stiffness and damping by least squares over n instants; every array has a row for each fit.
+
+    ``stiffness`` and ``rate`` are complex, all else float: g (1/s^2), b (1/s), ``|X|``, time in periods (for the overlap of the
+    windows), variable of the polynomials k and c of this ``degree``, and weights of the instants.
+    """
     scale = size * np.sqrt(weight)
     powers = place[..., None] ** np.arange(degree + 1)
     columns = np.concatenate([powers, powers * rate[..., None]], axis=2) * scale[..., None]
@@ -108,6 +93,11 @@ def _real(values: NDArray[Any]) -> Float:
 
 def _transposed(values: NDArray[Any]) -> Float:
     return np.asarray(values.swapaxes(1, 2))
+
+
+def neighbours(count: int) -> list[slice]:
+    """Return the levels within two (chosen) of each of ``count`` levels, over which an error is smoothed."""
+    return [slice(max(0, n - 2), n + 3) for n in range(count)]
 
 
 def noise_variances(fits: Sequence[LocalFit]) -> Float:

@@ -12,7 +12,7 @@ import numpy as np
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
-from identification.slow_flows.fits import LocalFit, as_settled, local_fit
+from identification.slow_flows.fits import LocalFit, as_settled, local_fits
 from identification.slow_flows.signals import window_correlations
 from identification.slow_flows.slow_flow import SlowFlow
 from vibrolock.arrays import Complex, Float
@@ -31,7 +31,9 @@ class Amplitudes:
 
 def fit_at(flow: SlowFlow, place: Float, weight: Float, degree: int) -> LocalFit:
     """Fit stiffness and damping of a slow flow where ``place`` (float[n]) is zero."""
-    fit = local_fit(flow.dynamic_stiffness, flow.rate_1_s, flow.amplitude_m, flow.phase_periods, place, weight, degree)
+    stiffness, rate = flow.dynamic_stiffness[None], flow.rate_1_s[None]
+    size, periods = flow.amplitude_m[None], flow.phase_periods[None]
+    (fit,) = local_fits(stiffness, rate, size, periods, place[None], weight[None], degree)
     return as_settled(fit, flow.residual_m_n / flow.drive_mode_shape**2)
 
 

@@ -187,14 +187,9 @@ def slow_flow(
 
     Parameters
     ----------
-    theta_rad
-        float[n], phase of the oscillator at the instant that each sample was measured, rising; wrapped or not.
-    samples
-        float[n_channels, n], in the unit of each channel, SI. Give the whole record and take slices of the result.
-    channels
-        The channels, one per row of ``samples``; force and drive-point motion among them.
-    sample_rate_hz
-        Samples per second.
+    theta_rad, samples, channels, sample_rate_hz
+        As for `periodic_vibration`, force and drive-point motion among the channels. Give the whole record and take slices of
+        the result.
     drive_mode_shape
         Mass-normalised linear mode shape at the drive point, kg^-1/2; the damping is proportional to its square.
     harmonics

@@ -139,16 +139,13 @@ class Balance:
         scale = np.append(np.repeat(np.where(sizes[:n] > 0.0, sizes[:n], 1.0), series.size), [1.0, 1.0])
         return value, jacobian, scale
 
+    @np.errstate(all="ignore")  # a trial step may overflow; results that are not finite are refused
     def solve(self, start: Float, conditions: Conditions) -> Solution:
         """Solve by Newton's method, halving steps until the residual falls; raise `NotConvergedError` without convergence."""
-        with np.errstate(all="ignore"):  # a trial step may overflow; results that are not finite are refused
-            return self._solve(start, conditions)
-
-    def _solve(self, start: Float, conditions: Conditions) -> Solution:
         y = start
         value, jacobian, scale = self.residual(y, conditions)
         for _ in range(_ITERATIONS):
-            size = _size(value / scale)
+            size = np.max(np.abs(value / scale))
             if size < _TOLERANCE:
                 if not np.all(y[-2:] > 0.0):  # a negative voltage: the same vibration shifted by half a period
                     raise NotConvergedError(f"no periodic vibration with a positive voltage found at {conditions}")
@@ -161,7 +158,7 @@ class Balance:
             share = min(1.0, _LARGEST_FREQUENCY_STEP * y[-2] / max(abs(step[-2]), 1e-300))
             for _ in range(_HALVINGS):
                 trial = self.residual(y + share * step, conditions)
-                if _size(trial[0] / scale) < size:
+                if np.max(np.abs(trial[0] / scale)) < size:
                     break
                 share *= 0.5
             y = y + share * step
@@ -177,7 +174,3 @@ class Balance:
         harmonics = np.zeros((self.n_site, self.series.orders.size), np.complex128)
         harmonics[:, 1] = voltage * transfer[: self.n_site]
         return np.append(self.series.to_real(harmonics).ravel(), [omega_rad_s, voltage])
-
-
-def _size(scaled: Float) -> float:
-    return float(np.max(np.abs(scaled)))

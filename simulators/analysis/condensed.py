@@ -89,7 +89,8 @@ class CondensedStructure:
         """
         inverse, slope = self._receptance(omega_rad_s, orders)
         s = 1j * omega_rad_s * orders[:, None, None]
-        rows = np.concatenate([self.rows + s * self.rate_rows, self._drive_rows(orders)], axis=1)
+        drive = np.broadcast_to(self.drive.astype(np.complex128), (orders.size, 1, self.drive.size))
+        rows = np.concatenate([self.rows + s * self.rate_rows, drive], axis=1)
         by_omega = np.zeros_like(rows)
         by_omega[:, : self.n_site] = 1j * orders[:, None, None] * self.rate_rows
         states = inverse @ self.columns
@@ -101,9 +102,6 @@ class CondensedStructure:
             np.concatenate([value[:, :n], force, value[:, n:]], axis=1),
             np.concatenate([change[:, :n], none, change[:, n:]], axis=1),
         )
-
-    def _drive_rows(self, orders: NDArray[np.int64]) -> Complex:
-        return np.broadcast_to(self.drive.astype(np.complex128), (orders.size, 1, self.drive.size))
 
     def states(self, omega_rad_s: float, inputs: Complex) -> Complex:
         """Return the harmonics of the rig's state [n_order, n] from those of site forces and force [n_site + 1, n_order]."""

@@ -56,7 +56,11 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
             field="frequencies_hz", value=np.max(frequencies), allowed=f"below {0.5 * rate_hz:g}, half the sample rate"
         )
     s = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
-    states = _held_states(plant, s, 1.0 / rate_hz) if held else _states(plant.dynamics, plant.voltage_column, s)
+    if held:  # (e^{sT} - e^{AT})^-1 Gamma: state at the sample instants
+        phi = phi_matrices(plant.dynamics, plant.voltage_column[:, None], 1.0 / rate_hz)
+        states = _states(phi.transition, phi.held[:, 0], np.exp(s * (1.0 / rate_hz)))
+    else:
+        states = _states(plant.dynamics, plant.voltage_column, s)
     n = plant.dynamics.shape[0]
     shapes = {at: rig.shape(at) for at in points}
 
@@ -77,12 +81,6 @@ def _states(transition: Float, column: Float, z: Complex) -> Complex:
     """Return ``(z - A)^-1 b`` for every z [n_frequency, n]."""
     left = z[:, None, None] * np.eye(column.size) - transition
     return np.asarray(np.linalg.solve(left, np.broadcast_to(column[:, None], (z.size, column.size, 1)))[..., 0])
-
-
-def _held_states(plant: LinearPlant, s: Complex, step_s: float) -> Complex:
-    """Return ``(e^{sT} - e^{AT})^-1 Gamma``: state at the sample instants under a held voltage [n_frequency, n]."""
-    phi = phi_matrices(plant.dynamics, plant.voltage_column[:, None], step_s)
-    return _states(phi.transition, phi.held[:, 0], np.exp(s * step_s))
 
 
 def _receptances(plant: LinearPlant, shapes: dict[str, Float], s: Complex) -> dict[str, Complex]:

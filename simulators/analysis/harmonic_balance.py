@@ -10,14 +10,13 @@ the specimen of one run.
 Phase lags are those of the drive point's acceleration behind the stinger force (fundamentals); -90 deg is phase resonance.
 """
 
-from typing import Literal
+from typing import Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simulators.analysis.conditions import Conditions, Quantity, held_force, lags_rad, levels, positive
-from simulators.analysis.force_control import ForceHarmonics
-from simulators.analysis.paths import HARMONICS, SAMPLES, ModePaths
+from simulators.analysis.paths import BalanceOptions, ModePaths
 from simulators.analysis.responses import PeriodicResponses
 from simulators.virtual_rig import VirtualRig
 from vibrolock.errors import InputError
@@ -36,10 +35,7 @@ def phase_resonance_backbone(
     quantity: Quantity = "fundamental",
     phase_lag_deg: float = RESONANCE_DEG,
     excitation: Literal["exciter", "pure-sine"] = "exciter",
-    force_harmonics: ForceHarmonics | None = None,
-    near_hz: float | None = None,
-    harmonics: int = HARMONICS,
-    samples: int = SAMPLES,
+    **options: Unpack[BalanceOptions],
 ) -> PeriodicResponses:
     """Compute the vibration at phase resonance, or at another lag, for each level; each level continues from the previous one.
 
@@ -79,10 +75,10 @@ def phase_resonance_backbone(
     held_as = held_force(quantity)
     if excitation == "pure-sine" and held == "voltage":
         raise InputError("allowed with excitation = 'exciter', a pure sine has forces_n", field="voltages_v")
-    if excitation == "pure-sine" and force_harmonics is not None:
+    if excitation == "pure-sine" and options.get("force_harmonics") is not None:
         raise InputError(field="force_harmonics", allowed="with excitation = 'exciter', a pure sine has none")
     lag = float(lags_rad("phase_lag_deg", [phase_lag_deg])[0])
-    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics, pure_sine=excitation == "pure-sine")
+    paths = ModePaths.of(rig, **options, pure_sine=excitation == "pure-sine")
     goals = [Conditions(held_as if held == "force" else held, float(level), "lag", lag) for level in values]
     return paths.evaluation(paths.path(goals))
 
@@ -93,10 +89,7 @@ def constant_force_response(
     phase_lags_deg: ArrayLike | None = None,
     *,
     quantity: Quantity = "fundamental",
-    force_harmonics: ForceHarmonics | None = None,
-    near_hz: float | None = None,
-    harmonics: int = HARMONICS,
-    samples: int = SAMPLES,
+    **options: Unpack[BalanceOptions],
 ) -> PeriodicResponses:
     """Compute the frequency response at constant force, from below to above resonance, including the unstable branch.
 
@@ -124,7 +117,7 @@ def constant_force_response(
     """
     force, held = float(positive("force_n", [force_n])[0]), held_force(quantity)
     lags = _lags(phase_lags_deg)
-    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics)
+    paths = ModePaths.of(rig, **options)
     return paths.over_lags([Conditions(held, force, "lag", float(lag)) for lag in lags])
 
 
@@ -134,10 +127,7 @@ def constant_displacement_response(
     phase_lags_deg: ArrayLike | None = None,
     *,
     frequencies_hz: ArrayLike | None = None,
-    force_harmonics: ForceHarmonics | None = None,
-    near_hz: float | None = None,
-    harmonics: int = HARMONICS,
-    samples: int = SAMPLES,
+    **options: Unpack[BalanceOptions],
 ) -> PeriodicResponses:
     """Compute vibrations at constant displacement amplitude of the drive point, as in a response-controlled stepped test.
 
@@ -160,7 +150,7 @@ def constant_displacement_response(
     amplitude = float(positive("amplitude_m", [amplitude_m])[0])
     if phase_lags_deg is not None and frequencies_hz is not None:
         raise InputError("both given", field="phase_lags_deg, frequencies_hz", allowed="one of them")
-    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics)
+    paths = ModePaths.of(rig, **options)
     if frequencies_hz is not None:
         omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
         goals = [Conditions("response", amplitude, "frequency", float(w)) for w in omega]
@@ -172,11 +162,7 @@ def forced_response(
     rig: VirtualRig,
     voltage_v: float,
     frequencies_hz: ArrayLike,
-    *,
-    force_harmonics: ForceHarmonics | None = None,
-    near_hz: float | None = None,
-    harmonics: int = HARMONICS,
-    samples: int = SAMPLES,
+    **options: Unpack[BalanceOptions],
 ) -> PeriodicResponses:
     """Compute the response to a constant voltage at each frequency, as in a slow sweep without control in this order.
 
@@ -194,14 +180,12 @@ def forced_response(
         Amplitude of the voltage.
     frequencies_hz
         Frequencies [n], in the order of the sweep.
-    near_hz
-        The linear mode that modal amplitude and damping refer to, as for `phase_resonance_backbone`.
-    force_harmonics, harmonics, samples
+    force_harmonics, near_hz, harmonics, samples
         As for `phase_resonance_backbone`.
     """
     voltage = float(positive("voltage_v", [voltage_v])[0])
     omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
-    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics)
+    paths = ModePaths.of(rig, **options)
     return paths.evaluation(paths.path([Conditions("voltage", voltage, "frequency", float(w)) for w in omega]))
 
 

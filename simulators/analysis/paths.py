@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypedDict
 
 import numpy as np
 
@@ -13,8 +14,6 @@ from simulators.analysis.force_control import ForceControl, ForceHarmonics
 from simulators.analysis.responses import NotConvergedError, PeriodicResponses
 from simulators.virtual_rig import VirtualRig
 
-HARMONICS = 15
-SAMPLES = 512
 _RESONANCE_RAD = -0.5 * math.pi
 _NEARLY_LINEAR = 1e-3
 """Share of the first level at which a path starts, from the vibration of the linear rig."""
@@ -43,7 +42,8 @@ def from_rest(balance: Balance, goal: Conditions, omega_rad_s: float) -> Solutio
 def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -> Solution:
     """Return the vibration at ``goal`` on the branch of ``here``; raise `NotConvergedError` if the branch does not reach it."""
     now = here.conditions
-    if _far(now, goal):
+    turn = abs(goal.value - now.value) if goal.at == "lag" else 0.0
+    if abs(math.log(goal.level / now.level)) > math.log(_LARGEST_LEVEL_RATIO) or turn > _LARGEST_LAG_STEP:
         return follow(balance, follow(balance, here, now.halfway_to(goal)), goal)
     start = here.unknowns + here.tangent(level=goal.level / now.level - 1.0, value=goal.value - now.value)
     try:
@@ -57,11 +57,17 @@ def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -
     return follow(balance, middle, goal, depth + 1)
 
 
-def _far(now: Conditions, goal: Conditions) -> bool:
-    ratio = abs(math.log(goal.level / now.level))
-    return ratio > math.log(_LARGEST_LEVEL_RATIO) or (
-        goal.at == "lag" and abs(goal.value - now.value) > _LARGEST_LAG_STEP
-    )
+class BalanceOptions(TypedDict, total=False):
+    """Options of all responses by harmonic balance."""
+
+    force_harmonics: ForceHarmonics | None
+    """Harmonics of the stinger force that are controlled; by default none, and the voltage is a sine."""
+    near_hz: float | None
+    """Frequency near the linear mode that is followed, and to which modal amplitude and damping refer."""
+    harmonics: int
+    """Highest harmonic, by default 15."""
+    samples: int
+    """Samples per period, at least four per harmonic; by default 512."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +82,11 @@ class ModePaths:
     def of(
         cls,
         rig: VirtualRig,
-        near_hz: float | None,
-        harmonics: int,
-        samples: int,
-        force_harmonics: ForceHarmonics | None = None,
         *,
+        near_hz: float | None = None,
+        harmonics: int = 15,
+        samples: int = 512,
+        force_harmonics: ForceHarmonics | None = None,
         pure_sine: bool = False,
     ) -> "ModePaths":
         """Return the paths of the mode nearest to ``near_hz``, after a check of the arguments."""

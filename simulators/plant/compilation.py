@@ -56,26 +56,18 @@ def _exponential(matrix: bytes) -> Float:
     return found
 
 
-class StepColumns(NamedTuple):
-    """Padded matrices of the sub-step for the kernels; rows are ``[joint coordinates, element coordinates, x]``."""
+def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> tuple[Float, Float]:
+    """Return predictor [n_input, n_row] and corrector [n_site, n_row] of the sub-step, padded for the kernels.
 
-    predictor: Float
-    """[n_input, n_row]."""
-    corrector: Float
-    """[n_site, n_row]."""
-
-
-def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> StepColumns:
-    """Return predictor and corrector, extended by rows that give the site coordinates.
-
-    Joints are the last ``n_joint`` sites. Their coordinates begin at row 0, where aligned vectors can be loaded.
+    Rows are ``[joint coordinates, element coordinates, x]``. Joints are the last ``n_joint`` sites. Their coordinates begin at
+    row 0, where aligned vectors can be loaded.
     """
     columns = np.column_stack([plant.voltage_column, plant.site_columns])
     phi = phi_matrices(plant.dynamics, columns, step_s)
     predictor = np.hstack([phi.transition, phi.held])
     corrector = phi.ramp[:, 1:]
     fold = np.vstack([np.roll(plant.site_rows, n_joint, axis=0), np.eye(plant.dynamics.shape[0])])
-    return StepColumns(pad((fold @ predictor).T), pad((fold @ corrector).T, rows=False))
+    return pad((fold @ predictor).T), pad((fold @ corrector).T, rows=False)
 
 
 def pad(matrix: Float, *, rows: bool = True) -> Float:
@@ -113,7 +105,7 @@ def rig_arrays(
     seed: int,
 ) -> RigArrays:
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
-    step = step_columns(plant, len(joints), converter.step_s)
+    predictor, corrector = step_columns(plant, len(joints), converter.step_s)
     jenkins = jenkins_elements(joints)
     substeps = converter.substeps // converter.oversampling
     sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
@@ -128,8 +120,8 @@ def rig_arrays(
     conditioning = [_conditioning(sensor, converter) for sensor in sensors]
     return RigArrays(
         plant=np.array([sizes], PLANT),
-        step=step.predictor,
-        correct=step.corrector,
+        step=predictor,
+        correct=corrector,
         sites=local_sites(elements, exciter),
         elements=jenkins,
         stuck=jenkins[0].sum(axis=0),
@@ -148,8 +140,8 @@ def rediscretised(
     rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Float], converter: Converter
 ) -> RigArrays:
     """Return a rig's arrays for another plant with the same coordinates and sites; ``outputs``: one row per sensor."""
-    step = step_columns(plant, n_joint, converter.step_s)
-    return rig._replace(step=step.predictor, correct=step.corrector, sense=pad(np.array(outputs).T))
+    predictor, corrector = step_columns(plant, n_joint, converter.step_s)
+    return rig._replace(step=predictor, correct=corrector, sense=pad(np.array(outputs).T))
 
 
 def jenkins_elements(joints: Sequence[FrictionSite]) -> Float:

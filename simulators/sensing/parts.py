@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from simulators.part import Part, Positive
+from simulators.part import NotNegative, Part, Positive
 from vibrolock.errors import InputError
 
 TAPS = 6
@@ -15,7 +15,6 @@ LOWEST_INTERNAL_RATE_HZ = 4000.0
 LOWEST_CORNER = 0.001
 """Lowest corner of a converter's filter over the sample rate; such a filter delays by about six hundred samples."""
 
-NotNegative = Annotated[float, Field(ge=0.0)]
 Bits = Annotated[int, Field(ge=0, le=32)]
 Order = Annotated[int, Field(ge=1, le=8)]
 

@@ -8,12 +8,10 @@ from typing import Annotated, Protocol
 import numpy as np
 from pydantic import Field, model_validator
 
-from simulators.part import Part, Positive, Several
+from simulators.part import NotNegative, Part, Positive, Several
 from simulators.structures.beam import Lump, Quantity, Spring
 from vibrolock.arrays import Float
 from vibrolock.errors import InputError
-
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class LumpedMass(Part):

@@ -6,14 +6,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from simulators.part import Part, Positive, Several
+from simulators.part import NotNegative, Part, Positive, Several
 from simulators.structures.beam import BeamModes, Boundary, Quantity, beam_modes
 from simulators.structures.lap_joint import Interface, LapJointModes, LapMesh, Section, lap_joint_modes
 from simulators.structures.meshed import MeshedBeam, check_rising
 from vibrolock.arrays import Float
 from vibrolock.errors import InputError
-
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 # A bench, its twins and its variants have the same beam: finite elements are solved once for all of them.
 _beam_modes = lru_cache(maxsize=16)(beam_modes)

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from identification.slow_flows.fits import local_fit, local_fits
+from identification.slow_flows.fits import local_fits
 
 
 def rows(fits: int, n: int):
@@ -27,7 +27,7 @@ def test_stiffness_and_damping_are_those_of_weighted_least_squares(degree):
     found = np.linalg.lstsq(
         np.vstack([design.real, design.imag]), np.r_[(stiffness * scale[:, 0]).real, (stiffness * scale[:, 0]).imag]
     )[0]
-    fit = local_fit(stiffness, rate, size, periods, place, weight, degree)
+    (fit,) = local_fits(*(row[None] for row in (stiffness, rate, size, periods, place, weight)), degree)
     assert fit.stiffness == pytest.approx(found[0], rel=1e-9)
     assert fit.damping == pytest.approx(found[degree + 1], rel=1e-7)
     np.testing.assert_allclose(fit.slopes, found[1 : degree + 1], rtol=1e-7)
@@ -51,6 +51,6 @@ def test_the_stated_spread_is_that_of_fits_to_noise_of_the_stated_correlation():
 def test_many_fits_at_once_are_each_of_them_alone(degree):
     given = rows(4, 11)
     for number, together in enumerate(local_fits(*given, degree)):
-        alone = local_fit(*(row[number] for row in given), degree)
+        (alone,) = local_fits(*(row[number : number + 1] for row in given), degree)
         for one in fields(alone):
             np.testing.assert_allclose(getattr(together, one.name), getattr(alone, one.name), rtol=1e-9)
