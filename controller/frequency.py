@@ -95,11 +95,8 @@ class FrequencySettings(Settings):
             raise InputError("the frequency-error law needs it above 0", field="frequency_integral_per_s", value=0)
         InputError.raise_if(self.period_mean, "allowed with the phase law only", field="period_mean", value=True)
         if abs(math.sin(math.radians(self.phase_lag_deg))) < math.sin(math.radians(5.0)):
-            raise InputError(
-                "the frequency-error law allows -175 to -5 and 5 to 175",
-                field="phase_lag_deg",
-                value=self.phase_lag_deg,
-            )
+            reason = "the frequency-error law allows -175 to -5 and 5 to 175"
+            raise InputError(reason, field="phase_lag_deg", value=self.phase_lag_deg)
         return self
 
     def build_frequency(

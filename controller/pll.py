@@ -25,19 +25,11 @@ class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorS
     @model_validator(mode="after")
     def _detector_suffices(self) -> Self:
         if self.detector == "sign" and self.phase_lag_deg != -90.0:
-            raise InputError(
-                "the sign detector knows phase resonance only",
-                field="phase_lag_deg",
-                value=self.phase_lag_deg,
-                allowed="-90",
-            )
+            reason = "the sign detector knows phase resonance only"
+            raise InputError(reason, field="phase_lag_deg", value=self.phase_lag_deg, allowed="-90")
         if self.detector == "sign" and self.frequency_law == "frequency-error":
-            raise InputError(
-                "the frequency-error law needs amplitudes",
-                field="detector",
-                value="sign",
-                allowed="two-phase or adaptive",
-            )
+            reason = "the frequency-error law needs amplitudes"
+            raise InputError(reason, field="detector", value="sign", allowed="two-phase or adaptive")
         return self
 
     @property

@@ -93,12 +93,8 @@ def in_newtons(channels: Sequence[Channel], what: str) -> None:
         if (channel.role == "force" and channel.unit != "N") or (
             channel.role in ("drive", "response") and channel.unit in ("V", "1")
         ):
-            raise IdentificationError(
-                f"{what} needs a force in N and motions in m, m/s or m/s2",
-                where=f"channel '{channel.name}'",
-                field="unit",
-                value=channel.unit,
-            )
+            reason = f"{what} needs a force in N and motions in m, m/s or m/s2"
+            raise IdentificationError(reason, where=f"channel '{channel.name}'", field="unit", value=channel.unit)
 
 
 def chosen_rows(

@@ -57,11 +57,8 @@ class FrequencyResponse(Result):
             array = finite_array(name, getattr(self, name), dtype, 1)
             object.__setattr__(self, name, array)
             if array.shape != self.frequency_hz.shape or not array.size:
-                raise IdentificationError(
-                    f"{array.size} values for {self.frequency_hz.size} frequencies",
-                    field=name,
-                    allowed="at least one of each",
-                )
+                reason = f"{array.size} values for {self.frequency_hz.size} frequencies"
+                raise IdentificationError(reason, field=name, allowed="at least one of each")
             refused = array <= 0.0 if name == "frequency_hz" else array == 0.0
             if refused.any():
                 where = int(np.argmax(refused))

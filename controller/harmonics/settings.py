@@ -141,11 +141,8 @@ def check_wanted(name: str, wanted: Mapping[int, tuple[float, float]], highest: 
         if not 2 <= order <= highest:
             raise InputError(f"has harmonic {order}", field=name, allowed=f"2 to {highest}, the loop's highest")
         if not (0.0 <= ratio <= LARGEST_WANTED and math.isfinite(phase_deg)):
-            raise InputError(
-                f"harmonic {order} = [{ratio:g}, {phase_deg:g}]",
-                field=name,
-                allowed=f"a ratio from 0 to {LARGEST_WANTED:g} and a phase",
-            )
+            reason = f"harmonic {order} = [{ratio:g}, {phase_deg:g}]"
+            raise InputError(reason, field=name, allowed=f"a ratio from 0 to {LARGEST_WANTED:g} and a phase")
 
 
 def harmonic_ratios(wanted: Mapping[int, tuple[float, float]]) -> np.ndarray:

@@ -39,13 +39,11 @@ def low_pass_from_densities(
     of each signal has the variance ``N_0 w_LP/(2 A^2)``.
     """
     if not min(force_amplitude, acceleration_amplitude, omega_rad_s, lag_std_deg) > 0.0:
-        raise InputError(
+        reason = (
             f"acceleration_amplitude = {acceleration_amplitude:g}, omega_rad_s = {omega_rad_s:g}, "
-            f"lag_std_deg = {lag_std_deg:g}",
-            field="force_amplitude",
-            value=force_amplitude,
-            allowed="all above 0",
+            f"lag_std_deg = {lag_std_deg:g}"
         )
+        raise InputError(reason, field="force_amplitude", value=force_amplitude, allowed="all above 0")
     per_w = 0.5 * (force_density / force_amplitude**2 + acceleration_density / acceleration_amplitude**2)
     wanted = math.radians(lag_std_deg) ** 2 / per_w if per_w > 0.0 else math.inf
     chosen = min(max(wanted, LOWEST * omega_rad_s), HIGHEST * omega_rad_s)

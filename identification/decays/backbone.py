@@ -93,11 +93,8 @@ def decay_backbone(
     last = data.shape[1] if stop_s is None else min(data.shape[1], round(positive("stop_s", stop_s, "s") * rate_hz))
     part = data[:, round(begin_s * rate_hz) : last]
     if part.shape[1] < _FEWEST_SAMPLES:
-        raise IdentificationError(
-            f"{part.shape[1]} samples from {begin_s:g} s on, where the decay begins, to its end",
-            field="start_s, stop_s",
-            allowed=f"{_FEWEST_SAMPLES} at least",
-        )
+        reason = f"{part.shape[1]} samples from {begin_s:g} s on, where the decay begins, to its end"
+        raise IdentificationError(reason, field="start_s, stop_s", allowed=f"{_FEWEST_SAMPLES} at least")
     candidates, notes = separated(part[motions], rate_hz, near)
     if drive_mode_shape is not None and len(candidates) > 1:
         raise IdentificationError(
@@ -153,11 +150,8 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
     theta, periods = candidate.track.theta_rad, candidate.periods
     fastest = float(np.max(np.diff(theta)))
     if 2.0 * np.pi / fastest < _MIN_SAMPLES_PER_PERIOD:
-        raise IdentificationError(
-            f"{2.0 * np.pi / fastest:.2f} samples per period of the mode at {candidate.track.start_hz:.4g} Hz",
-            field="samples",
-            allowed=f"at least {_MIN_SAMPLES_PER_PERIOD:g}",
-        )
+        reason = f"{2.0 * np.pi / fastest:.2f} samples per period of the mode at {candidate.track.start_hz:.4g} Hz"
+        raise IdentificationError(reason, field="samples", allowed=f"at least {_MIN_SAMPLES_PER_PERIOD:g}")
     found = demodulated(theta, record.data, record.rate_hz, periods)
     variance = noise_variance(theta, record.data, periods)
     reference = _reference(record, found.values, variance)

@@ -111,11 +111,8 @@ def ridge(signal: Float, rate_hz: float, near_hz: float) -> Ridge | None:
     lengths = [round(periods * rate_hz / near_hz) for periods in _WINDOWS]
     lengths = [length for length in lengths if 4 * length <= signal.size] or [signal.size // 3]
     if lengths[0] < _FEWEST_PERIODS * rate_hz / near_hz:
-        raise IdentificationError(
-            f"{signal.size} samples of the decay are too few periods at {near_hz:g} Hz",
-            field="samples",
-            allowed=f"at least {3 * _FEWEST_PERIODS:g}",
-        )
+        reason = f"{signal.size} samples of the decay are too few periods at {near_hz:g} Hz"
+        raise IdentificationError(reason, field="samples", allowed=f"at least {3 * _FEWEST_PERIODS:g}")
     best, largest = None, 0.0
     for length in lengths:
         found = _followed(signal, rate_hz, near_hz, length)

@@ -99,11 +99,8 @@ def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -
     below = np.flatnonzero(unknown | (size > _RISEN * np.minimum.accumulate(size)))
     count = int(below[0]) if below.size else size.size
     if count < _FEWEST_INSTANTS:
-        raise IdentificationError(
-            f"the decay is above the noise for {count} instants of the slow flow",
-            field="samples",
-            allowed=_FEWEST_INSTANTS,
-        )
+        reason = f"the decay is above the noise for {count} instants of the slow flow"
+        raise IdentificationError(reason, field="samples", allowed=_FEWEST_INSTANTS)
     return rest.select(np.arange(size.size) < count)
 
 

@@ -128,12 +128,9 @@ def resampled_periods(samples: Float, period_samples: int, rate_hz: float, new_r
     exact = period_samples * new_rate_hz / rate_hz
     size = round(exact)
     if size < 3 or abs(exact - size) > 1e-6:
-        raise IdentificationError(
-            f"a period of {period_samples} samples at {rate_hz:g} Hz then has {exact:.6g} samples",
-            field="rate_hz",
-            value=new_rate_hz,
-            allowed=f"whole multiples of {rate_hz / period_samples:g} Hz",
-        )
+        reason = f"a period of {period_samples} samples at {rate_hz:g} Hz then has {exact:.6g} samples"
+        allowed = f"whole multiples of {rate_hz / period_samples:g} Hz"
+        raise IdentificationError(reason, field="rate_hz", value=new_rate_hz, allowed=allowed)
     periods = samples.reshape(len(samples), -1, period_samples)
     if size == period_samples:
         return periods

@@ -117,11 +117,8 @@ def _lengths(
     before = min(round(_BEFORE * length), first) if pretrigger_s is None else round(pretrigger_s * rate)
     length = length if record_s is not None else length + before
     if length < _SHORTEST or before >= length // 2:
-        raise IdentificationError(
-            f"a record of a hit has {length} samples, {before} of them before it",
-            field="record_s",
-            allowed=f"{_SHORTEST} and at most half",
-        )
+        reason = f"a record of a hit has {length} samples, {before} of them before it"
+        raise IdentificationError(reason, field="record_s", allowed=f"{_SHORTEST} and at most half")
     return before, length
 
 

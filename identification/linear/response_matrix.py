@@ -128,11 +128,9 @@ class FrequencyResponseMatrix(Result):
         rows = list(range(len(self.outputs))) if outputs is None else [find_name(self.outputs, o) for o in outputs]
         lines = (self.frequency_hz >= lowest_hz) & (self.frequency_hz <= highest_hz)
         if not lines.any():
-            raise IdentificationError(
-                f"no line in {lowest_hz:g} to {highest_hz:g} Hz",
-                field="lowest_hz, highest_hz",
-                allowed=f"from {self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz",
-            )
+            reason = f"no line in {lowest_hz:g} to {highest_hz:g} Hz"
+            allowed = f"from {self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
+            raise IdentificationError(reason, field="lowest_hz, highest_hz", allowed=allowed)
         paths = (np.array(rows)[:, None] * len(self.inputs) + np.arange(len(self.inputs))).ravel()
 
         def part(covariance: Complex | None) -> Complex | None:

@@ -96,11 +96,9 @@ def _near(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequenc
     """Return one pole near each wanted frequency: that of the diagram, or the frequency with the damping that fits best."""
     near_hz = np.sort(finite_array("modes", wanted, np.float64, 1))
     if not near_hz.size or near_hz[0] < data.frequency_hz[0] or near_hz[-1] > data.frequency_hz[-1]:
-        raise IdentificationError(
-            f"frequencies are {', '.join(f'{f:g}' for f in near_hz) or 'none'} Hz",
-            field="modes",
-            allowed=f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz",
-        )
+        reason = f"frequencies are {', '.join(f'{f:g}' for f in near_hz) or 'none'} Hz"
+        allowed = f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
+        raise IdentificationError(reason, field="modes", allowed=allowed)
     frequency, damping, taken = near_hz.copy(), np.full(near_hz.size, np.nan), set[int]()
     candidates = np.flatnonzero(stable.stable)
     for number, wanted_hz in enumerate(near_hz):

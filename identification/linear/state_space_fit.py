@@ -159,12 +159,9 @@ def _check(data: WeightedResponses, start: StateSpace) -> None:
         )
     free = n * (outputs + inputs) + outputs * inputs
     if 2 * lines * outputs * inputs < free:
-        raise IdentificationError(
-            f"{lines} lines are too few for the {free} free parameters of {n} states",
-            field="frequency_hz",
-            allowed=f"at least {-(-free // (2 * outputs * inputs))}",
-            hint="lower the order",
-        )
+        reason = f"{lines} lines are too few for the {free} free parameters of {n} states"
+        allowed = f"at least {-(-free // (2 * outputs * inputs))}"
+        raise IdentificationError(reason, field="frequency_hz", allowed=allowed, hint="lower the order")
 
 
 def _whitened(whitening: Complex, values: Complex) -> Float:

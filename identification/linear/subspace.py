@@ -66,12 +66,9 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
     """
     lines, outputs, inputs = data.value.shape
     if 2 * lines * inputs < block_rows * (outputs + inputs):
-        raise IdentificationError(
-            f"{lines} lines are too few for {block_rows} block rows of {outputs} outputs and {inputs} inputs",
-            field="frequency_hz",
-            allowed=f"at least {-(-block_rows * (outputs + inputs) // (2 * inputs))}",
-            hint="lower the order",
-        )
+        reason = f"{lines} lines are too few for {block_rows} block rows of {outputs} outputs and {inputs} inputs"
+        allowed = f"at least {-(-block_rows * (outputs + inputs) // (2 * inputs))}"
+        raise IdentificationError(reason, field="frequency_hz", allowed=allowed, hint="lower the order")
     # One weight per line keeps the equations exact; lines with small errors have more weight.
     weight = 1.0 / np.sqrt(np.mean(data.std**2, axis=(1, 2)))
     powers = z[:, None] ** np.arange(block_rows) * (weight / np.linalg.norm(weight))[:, None]
@@ -118,12 +115,8 @@ def _root(covariance: Float) -> Float:
 def points_of(responses: FrequencyResponseMatrix, sample_rate_hz: float) -> Complex:
     """complex[n_lines]: ``exp(2 pi i f / sample_rate_hz)``; raises `IdentificationError` for responses without such points."""
     if responses.decay_rate_1_s:
-        raise IdentificationError(
-            field="decay_rate_1_s",
-            value=responses.decay_rate_1_s,
-            allowed="0",
-            hint="`linear_modes` takes such responses",
-        )
+        hint = "`linear_modes` takes such responses"
+        raise IdentificationError(field="decay_rate_1_s", value=responses.decay_rate_1_s, allowed="0", hint=hint)
     if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
         raise IdentificationError(
             field="sample_rate_hz", value=sample_rate_hz, allowed=f"more than twice {responses.frequency_hz[-1]:g} Hz"

@@ -62,11 +62,8 @@ def map_multisine(data: Any, mapping: MultisineMapping) -> PeriodicSpectra:
         ):
             whole = record.shape[1] // design.period_samples * design.period_samples
             if not whole:
-                raise IdentificationError(
-                    f"have {record.shape[1]} samples",
-                    field="channels",
-                    allowed=f"one period, {design.period_samples} at least",
-                )
+                allowed = f"one period, {design.period_samples} at least"
+                raise IdentificationError(f"have {record.shape[1]} samples", field="channels", allowed=allowed)
             records.append(record[:, :whole] * factors[:, None])
     if mapping.records is not None:
         if unknown := [number for number in mapping.records if number > len(records)]:

@@ -171,11 +171,8 @@ def _skipped(channels: Sequence[SampledChannel], starts: Sequence[float], rate_h
     late = (max(starts) - np.array(starts)) * rate_hz
     for channel, samples in zip(channels, late, strict=True):
         if abs(samples - round(samples)) > _WHOLE:
-            raise IdentificationError(
-                f"begins {samples:.2f} samples before another",
-                field=f"channels.{channel.name}",
-                allowed="whole samples, resample it",
-            )
+            reason = f"begins {samples:.2f} samples before another"
+            raise IdentificationError(reason, field=f"channels.{channel.name}", allowed="whole samples, resample it")
     return [round(samples) + channel.start_samples for channel, samples in zip(channels, late, strict=True)]
 
 

@@ -84,11 +84,8 @@ class MultisineDesign:
                 field="highest_hz", value=self.highest_hz, allowed=f"lowest_hz = {self.lowest_hz:g} Hz"
             )
         if self.highest_hz >= 0.5 * self.sample_rate_hz:
-            raise IdentificationError(
-                field="highest_hz",
-                value=self.highest_hz,
-                allowed=f"below half the sample rate, {0.5 * self.sample_rate_hz:g} Hz",
-            )
+            allowed = f"below half the sample rate, {0.5 * self.sample_rate_hz:g} Hz"
+            raise IdentificationError(field="highest_hz", value=self.highest_hz, allowed=allowed)
         if not self.lines.size:
             group = (
                 f", of which it takes groups of {self.detection_group} odd ones" if self.grid == "odd-random" else ""
@@ -109,11 +106,8 @@ class MultisineDesign:
                 f"has {values.size} values for {self.lines.size} lines", field="relative_amplitudes"
             )
         if np.any(values < 0.0) or not np.any(values):
-            raise IdentificationError(
-                f"lowest is {values.min():g}, highest {values.max():g}",
-                field="relative_amplitudes",
-                allowed="none below zero, one above",
-            )
+            reason = f"lowest is {values.min():g}, highest {values.max():g}"
+            raise IdentificationError(reason, field="relative_amplitudes", allowed="none below zero, one above")
 
     @classmethod
     def with_resolution(
@@ -131,19 +125,13 @@ class MultisineDesign:
         """Create a design from the spacing of its lines; a period must be a whole number of samples."""
         samples = positive("sample_rate_hz", sample_rate_hz, "Hz") / positive("resolution_hz", resolution_hz, "Hz")
         if not 3.0 <= samples <= _LONGEST_PERIOD:
-            raise IdentificationError(
-                f"a period has {samples:.4g} samples at {sample_rate_hz:g} Hz",
-                field="resolution_hz",
-                value=resolution_hz,
-                allowed=f"3 to {_LONGEST_PERIOD:.0e}",
-            )
+            reason = f"a period has {samples:.4g} samples at {sample_rate_hz:g} Hz"
+            allowed = f"3 to {_LONGEST_PERIOD:.0e}"
+            raise IdentificationError(reason, field="resolution_hz", value=resolution_hz, allowed=allowed)
         if abs(samples - round(samples)) > 1e-6:
-            raise IdentificationError(
-                f"a period has {samples:.4f} samples at {sample_rate_hz:g} Hz",
-                field="resolution_hz",
-                value=resolution_hz,
-                allowed=f"a whole number, such as {sample_rate_hz / round(samples):.9g} Hz gives",
-            )
+            reason = f"a period has {samples:.4f} samples at {sample_rate_hz:g} Hz"
+            allowed = f"a whole number, such as {sample_rate_hz / round(samples):.9g} Hz gives"
+            raise IdentificationError(reason, field="resolution_hz", value=resolution_hz, allowed=allowed)
         return cls(
             sample_rate_hz,
             round(samples),

@@ -113,12 +113,8 @@ def _instruments(
     """Return Z, complex[n_realisations, n_outputs or 1, n_inputs, n_lines], and its name for messages."""
     if estimator in ("H2", "Hv"):
         if len(columns) > 1:
-            raise IdentificationError(
-                f"is '{estimator}' with {len(columns)} inputs",
-                field="estimator",
-                allowed="one",
-                hint="H1 takes several",
-            )
+            reason = f"is '{estimator}' with {len(columns)} inputs"
+            raise IdentificationError(reason, field="estimator", allowed="one", hint="H1 takes several")
         y, u = means[:, rows], means[:, columns]
         if estimator == "H2":
             return y[:, :, None], "outputs"
@@ -130,11 +126,8 @@ def _instruments(
         return means[:, None, columns], "inputs"
     known = chosen("instruments", channels, instruments, ())
     if len(known) != len(columns):
-        raise IdentificationError(
-            f"are {len(known)} ({', '.join(channels[row].name for row in known)})",
-            field="instruments",
-            allowed=f"one per input, {len(columns)}",
-        )
+        reason = f"are {len(known)} ({', '.join(channels[row].name for row in known)})"
+        raise IdentificationError(reason, field="instruments", allowed=f"one per input, {len(columns)}")
     label = "instrument " if len(known) == 1 else "instruments "
     return means[:, None, known], label + ", ".join(f"'{channels[row].name}'" for row in known)
 
@@ -154,11 +147,9 @@ def _weights(u: Complex, z: Complex, frequency_hz: Float, label: str) -> Complex
     dependent = np.linalg.svd(cross, compute_uv=False).min(axis=-1) < _DEPENDENT
     if np.any(dependent):
         where = frequency_hz[int(np.argmax(dependent.any(axis=0)))]
-        raise IdentificationError(
-            f"does not move the {u.shape[1]} inputs independently of each other at {where:g} Hz",
-            field=label,
-            allowed="as many realisations with other phases at each input, best orthogonal ones",
-        )
+        reason = f"does not move the {u.shape[1]} inputs independently of each other at {where:g} Hz"
+        allowed = "as many realisations with other phases at each input, best orthogonal ones"
+        raise IdentificationError(reason, field=label, allowed=allowed)
     scaled = np.einsum("rojk,okji->roik", scaled_z, np.linalg.inv(cross))
     return np.asarray(scaled / size_u)
 

@@ -86,11 +86,9 @@ class PeriodicSpectra(Result):
         object.__setattr__(self, "spectra", finite_array("spectra", self.spectra, np.complex128, 4))
         expected = (len(self.channels), self.frequency_hz.size)
         if self.spectra.shape[2:] != expected or not self.spectra.size or self.excited.size != self.frequency_hz.size:
-            raise IdentificationError(
-                f"shape {self.spectra.shape} with {self.excited.size} values of excited",
-                field="spectra",
-                allowed=f"(realisations, periods, {expected[0]} channels, {expected[1]} lines)",
-            )
+            reason = f"shape {self.spectra.shape} with {self.excited.size} values of excited"
+            allowed = f"(realisations, periods, {expected[0]} channels, {expected[1]} lines)"
+            raise IdentificationError(reason, field="spectra", allowed=allowed)
 
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
@@ -189,17 +187,11 @@ def periodic_spectra(
         data = finite_array(f"records[{number}]", record, np.float64, 2)
         periods, left = divmod(data.shape[1], size)
         if data.shape[0] != len(channels) or left:
-            raise IdentificationError(
-                f"shape {data.shape}",
-                field=f"records[{number}]",
-                allowed=f"{len(channels)} channels by whole periods of {size} samples",
-            )
+            allowed = f"{len(channels)} channels by whole periods of {size} samples"
+            raise IdentificationError(f"shape {data.shape}", field=f"records[{number}]", allowed=allowed)
         if periods <= transient_periods:
-            raise IdentificationError(
-                f"has {periods} periods",
-                field=f"records[{number}]",
-                allowed=f"more than transient_periods = {transient_periods}",
-            )
+            allowed = f"more than transient_periods = {transient_periods}"
+            raise IdentificationError(f"has {periods} periods", field=f"records[{number}]", allowed=allowed)
         kept = data.reshape(len(channels), periods, size)[:, transient_periods:]
         lines = np.fft.rfft(kept, axis=-1)[..., design.band_lines] * (2.0 / size)
         spectra.append(np.moveaxis(lines, 0, 1))

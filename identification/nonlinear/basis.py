@@ -50,12 +50,9 @@ def shapes_for(
         )
     shapes = modes.shapes[np.ix_(rows, columns)]
     if (gain := _error_gain(shapes)) > _LARGEST_GAIN:
-        raise IdentificationError(
-            f"{listed} Hz look alike at {', '.join(channels)} (errors grow {gain:.0f} times",
-            field="modes",
-            allowed=f"{_LARGEST_GAIN:g})",
-            hint="measure where their shapes differ",
-        )
+        reason = f"{listed} Hz look alike at {', '.join(channels)} (errors grow {gain:.0f} times"
+        allowed = f"{_LARGEST_GAIN:g})"
+        raise IdentificationError(reason, field="modes", allowed=allowed, hint="measure where their shapes differ")
     found = ModeShapes(
         channels, shapes, 0, modes.shapes_std[np.ix_(rows, columns)], _shape_covariance(modes, rows, columns)
     )

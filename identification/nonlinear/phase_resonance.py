@@ -162,12 +162,9 @@ def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
                 "modal amplitude is zero", where=name, hint="check the channels of the mode shapes"
             )
         if np.isnan(found["modal_frequency_hz"][number]):
-            raise IdentificationError(
-                f"phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency",
-                where=name,
-                allowed="near 90 deg",
-                hint="check the polarity of force and drive channel",
-            )
+            reason = f"phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency"
+            hint = "check the polarity of force and drive channel"
+            raise IdentificationError(reason, where=name, allowed="near 90 deg", hint=hint)
     damping = found["damping_ratio"]
     negative = int(np.count_nonzero(damping < 0.0))
     if 2 * negative > damping.size:

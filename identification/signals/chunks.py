@@ -57,11 +57,8 @@ class ArrayRecord:
 def check_samples(samples: Float, channels: Sequence[Channel], size: int) -> None:
     """Raise `IdentificationError` unless ``samples`` has a row per channel and ``size`` columns."""
     if samples.shape != (len(channels), size):
-        raise IdentificationError(
-            f"shape {samples.shape}",
-            field="samples",
-            allowed=f"({len(channels)}, {size}): channels by samples of theta_rad",
-        )
+        allowed = f"({len(channels)}, {size}): channels by samples of theta_rad"
+        raise IdentificationError(f"shape {samples.shape}", field="samples", allowed=allowed)
 
 
 def rising_steps(theta: Float, first: int = 0) -> Float:

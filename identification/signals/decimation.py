@@ -46,11 +46,8 @@ def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray
         raise IdentificationError(field="new_rate_hz", value=new, allowed=f"at most rate_hz = {old:g} Hz")
     ratio = Fraction(new / old).limit_denominator(LARGEST_FACTOR)
     if ratio == 0 or abs(float(ratio) * old / new - 1.0) > 1e-12:
-        raise IdentificationError(
-            f"its ratio to rate_hz = {old:g} Hz must be one of whole numbers up to {LARGEST_FACTOR}",
-            field="new_rate_hz",
-            value=new,
-        )
+        reason = f"its ratio to rate_hz = {old:g} Hz must be one of whole numbers up to {LARGEST_FACTOR}"
+        raise IdentificationError(reason, field="new_rate_hz", value=new)
     if ratio == 1:
         return np.array(array)
     up, down = ratio.numerator, ratio.denominator

@@ -152,11 +152,8 @@ def _largest_step(theta: Float, periods: int) -> float:
         )
     per_period = 2.0 * np.pi / float(steps.max())
     if per_period < _MIN_SAMPLES_PER_PERIOD:
-        raise IdentificationError(
-            f"{per_period:.2f} samples in the shortest period",
-            field="theta_rad",
-            allowed=f"at least {_MIN_SAMPLES_PER_PERIOD:g}",
-        )
+        reason = f"{per_period:.2f} samples in the shortest period"
+        raise IdentificationError(reason, field="theta_rad", allowed=f"at least {_MIN_SAMPLES_PER_PERIOD:g}")
     return float(steps.max())
 
 

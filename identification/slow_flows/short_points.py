@@ -71,20 +71,14 @@ def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float |
     part = flow.between(flow.time_s[0] if start_s is None else start_s, flow.time_s[-1] if stop_s is None else stop_s)
     periods = float(part.phase_periods[-1] - part.phase_periods[0])
     if periods < _FEWEST_PERIODS:
-        raise IdentificationError(
-            f"{periods:.2f} periods between the first and the last instant",
-            field="start_s, stop_s",
-            allowed=f"at least {_FEWEST_PERIODS:g}",
-        )
+        reason = f"{periods:.2f} periods between the first and the last instant"
+        raise IdentificationError(reason, field="start_s, stop_s", allowed=f"at least {_FEWEST_PERIODS:g}")
     level = np.log(part.amplitude_m)
     change = float(np.ptp(level))
     if change > _LARGEST_CHANGE:
-        raise IdentificationError(
-            f"the amplitude changes by {100.0 * change:.0f} %",
-            field="start_s, stop_s",
-            allowed=f"{100.0 * _LARGEST_CHANGE:g} %",
-            hint="begin the point later",
-        )
+        reason = f"the amplitude changes by {100.0 * change:.0f} %"
+        allowed = f"{100.0 * _LARGEST_CHANGE:g} %"
+        raise IdentificationError(reason, field="start_s, stop_s", allowed=allowed, hint="begin the point later")
     centre = float(np.mean(level))
     middle = part.phase_periods - np.mean(part.phase_periods)
     place = (level - centre) / change if change > _STEADY else middle / periods

@@ -277,11 +277,8 @@ def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_perio
     steps = rising_steps(theta)
     covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
     if covered < WINDOW_PERIODS + fit_periods:
-        raise IdentificationError(
-            f"covers {covered:.2f} periods",
-            field="theta_rad",
-            allowed=f"{WINDOW_PERIODS + fit_periods:g} with fit_periods = {fit_periods:g}",
-        )
+        allowed = f"{WINDOW_PERIODS + fit_periods:g} with fit_periods = {fit_periods:g}"
+        raise IdentificationError(f"covers {covered:.2f} periods", field="theta_rad", allowed=allowed)
     needed = 2 * harmonics + 2
     if (per_period := 2.0 * np.pi / float(steps.max())) <= needed:
         raise IdentificationError(

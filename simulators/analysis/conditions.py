@@ -136,11 +136,8 @@ def checked_harmonics(harmonics: int, samples: int) -> tuple[int, int]:
             raise InputError(field=name, value=value, allowed="a whole number")
     InputError.unless_at_least("harmonics", harmonics, 1)
     if samples < _SAMPLES_PER_HARMONIC * (harmonics + 1):
-        raise InputError(
-            field="samples",
-            value=samples,
-            allowed=f"at least {_SAMPLES_PER_HARMONIC * (harmonics + 1)} for {harmonics} harmonics",
-        )
+        allowed = f"at least {_SAMPLES_PER_HARMONIC * (harmonics + 1)} for {harmonics} harmonics"
+        raise InputError(field="samples", value=samples, allowed=allowed)
     return harmonics, samples
 
 

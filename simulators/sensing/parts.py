@@ -101,11 +101,8 @@ class Converter(Part):
             )
         if self.reconstruction_hz >= 0.5 * self.internal_rate_hz:
             half_hz = 0.5 * self.internal_rate_hz
-            raise InputError(
-                field="reconstruction_hz",
-                value=self.reconstruction_hz,
-                allowed=f"below {half_hz:g}, half the internal rate",
-            )
+            allowed = f"below {half_hz:g}, half the internal rate"
+            raise InputError(field="reconstruction_hz", value=self.reconstruction_hz, allowed=allowed)
         lowest_hz = LOWEST_CORNER * self.sample_rate_hz
         for name, corner_hz in (("anti_alias_hz", self.anti_alias_hz), ("reconstruction_hz", self.reconstruction_hz)):
             if 0.0 < corner_hz < lowest_hz:

@@ -294,12 +294,9 @@ class User(LocalElement):
                 )
         at_rest_n = function(0.0, self.padded_parameters)
         if abs(at_rest_n) > LARGEST_FORCE_AT_REST_N:
-            raise InputError(
-                f"gives {at_rest_n:g} N at rest",
-                field="function",
-                value=named(self.function),
-                allowed="0: z counts from equilibrium",
-            )
+            reason = f"gives {at_rest_n:g} N at rest"
+            allowed = "0: z counts from equilibrium"
+            raise InputError(reason, field="function", value=named(self.function), allowed=allowed)
         return self
 
     @property
