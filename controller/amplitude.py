@@ -75,13 +75,11 @@ class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings
         through = self.force_loop == "through-response"
         if amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
             if self.force_loop == "linear" and self.k4 == 0.0:
-                raise InputError(
-                    "levels in newtons need the force loop's integral gain", field="k4", value=0, allowed="above 0"
-                )
+                reason = "levels in newtons need the force loop's integral gain"
+                raise InputError(reason, field="k4", value=0, allowed="above 0")
             if through and self.reference_integral_per_s == 0.0:
-                raise InputError(
-                    "a force held through the response needs it above 0", field="reference_integral_per_s", value=0
-                )
+                reason = "a force held through the response needs it above 0"
+                raise InputError(reason, field="reference_integral_per_s", value=0)
         held = amplitude_law is AmplitudeLaw.RESPONSE or (through and amplitude_law is not AmplitudeLaw.VOLTAGE)
         if held and self.response_integral_per_s == 0.0:
             raise InputError("a response is held with a gain above 0", field="response_integral_per_s", value=0)

@@ -74,12 +74,11 @@ class DetectorSettings(Settings):
         gain = -math.expm1(-self.low_pass_rad_s * dt)
         if self.detector == "adaptive" and gain * (2 * self.harmonics_followed + 1) > 1.0:
             largest = -math.log1p(-1.0 / (2 * self.harmonics_followed + 1)) / dt
-            raise InputError(
+            reason = (
                 f"an adaptive filter with {self.harmonics_followed} harmonics at {sample_rate_hz:g} samples/s "
-                f"allows up to {largest:.4g}",
-                field="low_pass_rad_s",
-                value=self.low_pass_rad_s,
+                f"allows up to {largest:.4g}"
             )
+            raise InputError(reason, field="low_pass_rad_s", value=self.low_pass_rad_s)
         out = np.zeros(1, DETECTOR)
         out["kind"] = KINDS[self.detector]
         out["harmonics"] = self.harmonics_followed

@@ -113,10 +113,8 @@ class FrequencySettings(Settings):
                 f"it may reach {sample_rate_hz / 4.0:g} Hz"
             )
         if drive_mode_shape is None and self.frequency_law == "frequency-error":
-            raise InputError(
-                "the frequency-error law needs it, here or as specimen.drive_mode_shape of the bench",
-                field="drive_mode_shape",
-            )
+            reason = "the frequency-error law needs it, here or as specimen.drive_mode_shape of the bench"
+            raise InputError(reason, field="drive_mode_shape")
         out = np.zeros(1, FREQUENCY)
         out["law"] = LAWS[self.frequency_law]
         out["kp"], out["ki"] = gains

@@ -37,10 +37,8 @@ class RestSettings(Settings):
     def build_rest(self, sample_rate_hz: float, drive_mode_shape: float | None) -> np.ndarray:
         """Return one record of `REST`; raise ValueError if the mode shape (kg^-1/2) is needed and missing."""
         if drive_mode_shape is None and self.rest_low_pass_rad_s > 0.0:
-            raise InputError(
-                "rest_low_pass_rad_s needs it, here or as specimen.drive_mode_shape of the bench",
-                field="drive_mode_shape",
-            )
+            reason = "rest_low_pass_rad_s needs it, here or as specimen.drive_mode_shape of the bench"
+            raise InputError(reason, field="drive_mode_shape")
         out = np.zeros(1, REST)
         out["gain"] = -math.expm1(-self.rest_low_pass_rad_s / sample_rate_hz)
         out["share"] = self.rest_share

@@ -51,13 +51,11 @@ class Backbone(Result):
         first = self.points[0]
         for number, point in enumerate(self.points):
             if point.channels != first.channels or point.harmonics.shape != first.harmonics.shape:
-                raise IdentificationError(
-                    "channels or harmonics differ from those of points[0]", field=f"points[{number}]"
-                )
+                reason = "channels or harmonics differ from those of points[0]"
+                raise IdentificationError(reason, field=f"points[{number}]")
         if self.drive_mode_shape is not None and not (np.isfinite(self.drive_mode_shape) and self.drive_mode_shape):
-            raise IdentificationError(
-                field="drive_mode_shape", value=self.drive_mode_shape, allowed="finite and not zero"
-            )
+            allowed = "finite and not zero"
+            raise IdentificationError(field="drive_mode_shape", value=self.drive_mode_shape, allowed=allowed)
         std = self.drive_mode_shape_std
         if std is not None and not (np.isfinite(std) and std >= 0.0):
             raise IdentificationError(field="drive_mode_shape_std", value=std, allowed="0 or above")

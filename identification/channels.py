@@ -73,9 +73,8 @@ def find_role(channels: Sequence[Channel], role: Role) -> int:
     found = [index for index, channel in enumerate(channels) if channel.role == role]
     if len(found) != 1:
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in channels) or "none"
-        raise IdentificationError(
-            f"{len(found)} have the role '{role}'", field="channels", allowed="exactly one", hint=f"channels: {names}"
-        )
+        reason = f"{len(found)} have the role '{role}'"
+        raise IdentificationError(reason, field="channels", allowed="exactly one", hint=f"channels: {names}")
     return found[0]
 
 
@@ -114,9 +113,8 @@ def chosen_rows(
         out = tuple(row for row in (*forces, *motions) if row not in into)
         if not out:
             names = ", ".join(f"{channel.name} ({channel.role})" for channel in channels)
-            raise IdentificationError(
-                "no channel is a motion, name them", field="outputs", hint=f"channels are {names}"
-            )
+            reason = "no channel is a motion, name them"
+            raise IdentificationError(reason, field="outputs", hint=f"channels are {names}")
     if both := [channels[row].name for row in out if row in into]:
         raise IdentificationError(f"{both[0]} is an input already", field="outputs")
     return into, out

@@ -80,9 +80,8 @@ class PeriodicVibration:
         IdentificationError.unless_at_least("periods", self.periods, 1)
         self._check("harmonics", np.complex128, 2)
         if self.harmonics.shape[1] < 2:
-            raise IdentificationError(
-                f"shape {self.harmonics.shape}", field="harmonics", allowed="harmonics 0 and 1 at least"
-            )
+            reason = f"shape {self.harmonics.shape}"
+            raise IdentificationError(reason, field="harmonics", allowed="harmonics 0 and 1 at least")
         self._check("residual_rms", np.float64, 1)
         if self.drift is not None:
             self._check("drift", np.complex128, 1)

@@ -89,13 +89,11 @@ class Exciter(Part):
     @model_validator(mode="after")
     def _limit_is_the_amplifiers(self) -> "Exciter":
         if self.amplifier == "current" and self.voltage_limit_v is not None:
-            raise InputError(
-                field="voltage_limit_v", value=self.voltage_limit_v, allowed="current_limit_a, it holds a current"
-            )
+            allowed = "current_limit_a, it holds a current"
+            raise InputError(field="voltage_limit_v", value=self.voltage_limit_v, allowed=allowed)
         if self.amplifier == "voltage" and self.current_limit_a is not None:
-            raise InputError(
-                field="current_limit_a", value=self.current_limit_a, allowed="voltage_limit_v, it holds a voltage"
-            )
+            allowed = "voltage_limit_v, it holds a voltage"
+            raise InputError(field="current_limit_a", value=self.current_limit_a, allowed=allowed)
         return self
 
     @property
@@ -151,9 +149,8 @@ class Stinger(Part):
         modulus = table.get("youngs_modulus_pa") or YOUNGS_MODULUS_PA.get(str(material))
         given = {"diameter_m": diameter, "length_m": length, "material": material or modulus}
         if missing := [key for key, value in given.items() if value is None]:
-            raise InputError(
-                "is missing", field=missing[0], allowed="stiffness_n_m, or diameter_m, length_m and a material"
-            )
+            reason = "is missing"
+            raise InputError(reason, field=missing[0], allowed="stiffness_n_m, or diameter_m, length_m and a material")
         numbers = [value for value in (modulus, diameter, length) if isinstance(value, int | float) and value > 0.0]
         if len(numbers) < 3:
             return table  # the field's own bounds say what is wrong

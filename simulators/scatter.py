@@ -106,9 +106,8 @@ def deviated(plant: LinearPlant, omega_rad_s: NDArray[np.float64], deviation: De
     moves = []
     for name, values in (("frequency", deviation.frequency), ("damping", deviation.damping)):
         if len(values) not in (0, m):
-            raise InputError(
-                f"has {len(values)} values", field=f"deviation.{name}", allowed=f"{m}, one per mode, or none"
-            )
+            reason = f"has {len(values)} values"
+            raise InputError(reason, field=f"deviation.{name}", allowed=f"{m}, one per mode, or none")
         moves.append(1.0 + (np.array(values) if values else np.zeros(m)))
     frequency, damping = moves
     stiffer = omega_rad_s**2 * (frequency**2 - 1.0)

@@ -120,9 +120,8 @@ class VirtualRig(Part):
         lowest = np.linalg.eigvalsh(slipping)[0]
         if lowest < -1e-9 * np.max(np.abs(plant.modal_stiffness)):
             total = sum(joint.stuck_stiffness for joint in self.friction)
-            raise InputError(
-                f"stiffness {total:.6g} in all", field="friction", allowed="less than the structure has there"
-            )
+            reason = f"stiffness {total:.6g} in all"
+            raise InputError(reason, field="friction", allowed="less than the structure has there")
 
     def _check_wear(self) -> None:
         """Raise `ValueError` if wear is for another number of modes, has steps below a sample, or ends in an invalid rig."""

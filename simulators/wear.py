@@ -78,7 +78,6 @@ class Wear(Part):
 
 def _per_mode(name: str, rates: tuple[float, ...], n_mode: int) -> NDArray[np.float64]:
     if len(rates) not in (0, 1, n_mode):
-        raise InputError(
-            f"has {len(rates)} values", field=f"wear.{name}", allowed=f"{n_mode}, one per mode, one for all, or none"
-        )
+        reason = f"has {len(rates)} values"
+        raise InputError(reason, field=f"wear.{name}", allowed=f"{n_mode}, one per mode, one for all, or none")
     return np.broadcast_to(np.array(rates or (0.0,)), n_mode)

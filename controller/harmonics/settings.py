@@ -57,19 +57,16 @@ class HarmonicsSettings(Settings):
         for name, orders in (("left_alone", self.left_alone), ("force_per_v", self.force_per_v)):
             for order in orders:
                 if not 2 <= order <= self.highest:
-                    raise InputError(
-                        f"has harmonic {order}", field=name, allowed=f"2 to {self.highest}, the loop's highest"
-                    )
+                    reason = f"has harmonic {order}"
+                    raise InputError(reason, field=name, allowed=f"2 to {self.highest}, the loop's highest")
         for order, value in self.force_per_v.items():
             if not (math.isfinite(abs(complex(*value))) and value != (0.0, 0.0)):
-                raise InputError(
-                    f"harmonic {order} = {list(value)}", field="force_per_v", allowed="finite numbers, not both 0"
-                )
+                reason = f"harmonic {order} = {list(value)}"
+                raise InputError(reason, field="force_per_v", allowed="finite numbers, not both 0")
         for order in self.left_alone:
             if order in self.wanted:
-                raise InputError(
-                    f"has harmonic {order}, which wanted prescribes", field="left_alone", allowed="one of them"
-                )
+                reason = f"has harmonic {order}, which wanted prescribes"
+                raise InputError(reason, field="left_alone", allowed="one of them")
         return self
 
     @property
@@ -99,22 +96,19 @@ class HarmonicsSettings(Settings):
         turn = 2.0 * math.pi * highest_hz / sample_rate_hz
         at = f"at {highest_hz:g} Hz and {sample_rate_hz:g} samples/s"
         if self.highest * turn > HIGHEST_TURN:
-            raise InputError(
-                f"allowed {at} is up to {int(HIGHEST_TURN / turn)}", field="harmonics.highest", value=self.highest
-            )
+            reason = f"allowed {at} is up to {int(HIGHEST_TURN / turn)}"
+            raise InputError(reason, field="harmonics.highest", value=self.highest)
         if self.corner * turn * (2 * self.highest + 1) > 1.0:
             most = 1.0 / (turn * (2 * self.highest + 1))
-            raise InputError(
-                f"allowed {at} is up to {most:.2g} with H = {self.highest}", field="harmonics.corner", value=self.corner
-            )
+            reason = f"allowed {at} is up to {most:.2g} with H = {self.highest}"
+            raise InputError(reason, field="harmonics.corner", value=self.corner)
         margin = self.phase_margin_deg(turn * loop_delay_samples)
         if margin < SMALLEST_MARGIN_DEG:
-            raise InputError(
-                f"its phase margin {at} is {margin:.0f} deg with {loop_delay_samples:g} samples from output to input",
-                field="harmonics.integral",
-                value=self.integral,
-                allowed=f"at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks, or a shorter queue",
+            reason = (
+                f"its phase margin {at} is {margin:.0f} deg with {loop_delay_samples:g} samples from output to input"
             )
+            allowed = f"at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks, or a shorter queue"
+            raise InputError(reason, field="harmonics.integral", value=self.integral, allowed=allowed)
 
     def longest_delay_s(self, highest_hz: float) -> float:
         """Return the delay with which the phase margin at ``highest_hz`` is the smallest allowed, s."""

@@ -145,15 +145,13 @@ def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike)
     h_f, h_a = np.asarray(force, np.complex128), np.asarray(acceleration, np.complex128)
     if frequency.ndim != 1 or h_f.shape != frequency.shape or h_a.shape != frequency.shape:
         shapes = f"{frequency.shape}, {h_f.shape} and {h_a.shape}"
-        raise InputError(
-            f"shapes {shapes}", field="frequency_hz, force_per_v, acceleration_per_v", allowed="three equal rows"
-        )
+        reason = f"shapes {shapes}"
+        raise InputError(reason, field="frequency_hz, force_per_v, acceleration_per_v", allowed="three equal rows")
     if frequency.size < 20:
         raise InputError(f"{frequency.size} lines", field="frequency_hz", allowed="at least 20 around the mode")
     if not (np.all(np.isfinite(h_f)) and np.all(np.isfinite(h_a)) and np.all(frequency > 0.0)):
-        raise InputError(
-            field="frequency_hz, force_per_v, acceleration_per_v", allowed="finite numbers, frequencies above 0"
-        )
+        allowed = "finite numbers, frequencies above 0"
+        raise InputError(field="frequency_hz, force_per_v, acceleration_per_v", allowed=allowed)
     return frequency, h_f, h_a
 
 
@@ -227,10 +225,8 @@ def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Float]:
     columns = np.stack([z**2 / (z**2 + c * z + k), np.ones_like(z), z**2], axis=1) * np.abs(h_f)[:, None]
     shape_squared, lower, upper = _real_least_squares(columns, y * np.abs(h_f))
     if shape_squared <= 0.0:
-        raise InputError(
-            "the resonance pulls instead of pushing (phi_d^2 < 0); check the polarity of force and acceleration",
-            field="force_per_v, acceleration_per_v",
-        )
+        reason = "the resonance pulls instead of pushing (phi_d^2 < 0); check the polarity of force and acceleration"
+        raise InputError(reason, field="force_per_v, acceleration_per_v")
     columns = np.stack([*(h_f * z**power for power in range(4)), *(h_a * z**power for power in range(-2, 2))], axis=1)
     exciter = _real_least_squares(columns, np.ones_like(z))
     mode = [0.5 * math.log(k), math.log(0.5 * c / math.sqrt(k)), math.log(shape_squared), lower, upper]

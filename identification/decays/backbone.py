@@ -116,13 +116,11 @@ def decay_backbone(
 
 def _check(data: Float, channels: tuple[Channel, ...], number: int, harmonics: int, shape: float | None) -> None:
     if data.shape[0] != len(channels):
-        raise IdentificationError(
-            f"shape {data.shape} for {len(channels)} channels", field="samples", allowed="one row per channel"
-        )
+        reason = f"shape {data.shape} for {len(channels)} channels"
+        raise IdentificationError(reason, field="samples", allowed="one row per channel")
     if not any(channel.role in ("drive", "response") for channel in channels):
-        raise IdentificationError(
-            "none is a motion (role drive or response), a decay needs at least one", field="channels"
-        )
+        reason = "none is a motion (role drive or response), a decay needs at least one"
+        raise IdentificationError(reason, field="channels")
     for name, value in (("number", number), ("harmonics", harmonics)):
         IdentificationError.unless_at_least(name, value, 1)
     if shape is not None and not (np.isfinite(shape) and shape):

@@ -73,9 +73,8 @@ def fitted_levels(series: Series, number: int, order: int) -> LevelFits:
     cost = np.array([table.cost for table in tables])
     least = cost.min(axis=0)
     if not np.isfinite(least).any():
-        raise IdentificationError(
-            "the decay is too short for a fit at any level; record it longer, or from a higher level", field="samples"
-        )
+        reason = "the decay is too short for a fit at any level; record it longer, or from a higher level"
+        raise IdentificationError(reason, field="samples")
     keep = np.flatnonzero(least < _WORST)
     if not keep.size:
         raise IdentificationError(

@@ -127,9 +127,8 @@ class DecayBackbone(Result):
         if near_hz is None:
             if len(self.modes) > 1:
                 listed = ", ".join(f"{mode.modal_frequency_hz[-1]:.4g} Hz" for mode in self.modes)
-                raise IdentificationError(
-                    f"the decay has {len(self.modes)} modes ({listed})", field="near_hz", hint="name one"
-                )
+                reason = f"the decay has {len(self.modes)} modes ({listed})"
+                raise IdentificationError(reason, field="near_hz", hint="name one")
             return self.modes[0]
         return min(self.modes, key=lambda mode: abs(float(mode.modal_frequency_hz[-1]) - near_hz))
 

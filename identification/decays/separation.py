@@ -68,9 +68,8 @@ def separated(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> t
         track = improved(one.track, data[one.row], rate_hz, periods)
         if not _above_noise(data[one.row], track, rate_hz, periods):
             if one.asked:
-                raise IdentificationError(
-                    f"the vibration at {one.middle_hz:.4g} Hz is not above the noise", field="near_hz"
-                )
+                reason = f"the vibration at {one.middle_hz:.4g} Hz is not above the noise"
+                raise IdentificationError(reason, field="near_hz")
             continue
         if any(one is not other and other.track.holds(track.start_hz) for other in found):
             why = f"the vibration at {one.middle_hz:.4g} Hz leads to that of a neighbour"
@@ -97,13 +96,11 @@ def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tupl
         new = _followed(data, rate_hz, at, asked=True)
         if new is None:
             listed = ", ".join(f"{peak:.4g}" for peak in peaks[:_MOST_MODES]) or "none"
-            raise IdentificationError(
-                f"no vibration near {near:g} Hz", field="near_hz", hint=f"peaks of the spectrum, Hz: {listed}"
-            )
+            reason = f"no vibration near {near:g} Hz"
+            raise IdentificationError(reason, field="near_hz", hint=f"peaks of the spectrum, Hz: {listed}")
         if any(other.track.holds(new.track.start_hz) for other in found):
-            raise IdentificationError(
-                f"{near:g} Hz leads to a mode that is named already, each one once", field="near_hz"
-            )
+            reason = f"{near:g} Hz leads to a mode that is named already, each one once"
+            raise IdentificationError(reason, field="near_hz")
         found.append(new)
     for peak in peaks:
         if len(found) >= _MOST_MODES or any(other.holds(peak) for other in (*(one.track for one in found), *harmonics)):

@@ -27,7 +27,5 @@ def check_not_zero(experiment: Experiment, what: str) -> None:
     """Raise `IdentificationError` if an output is zero where it counts, because its relative error is undefined."""
     for channel, values in zip(experiment.output_channels, experiment.counted_outputs, strict=True):
         if not np.any(values):
-            raise IdentificationError(
-                f"output '{channel.name}' is zero where it counts, and errors relative to it have no meaning",
-                where=what,
-            )
+            reason = f"output '{channel.name}' is zero where it counts, and errors relative to it have no meaning"
+            raise IdentificationError(reason, where=what)

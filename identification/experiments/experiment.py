@@ -165,9 +165,8 @@ class Experiment:
         if it is not periodic.
         """
         if not self.period_samples:
-            raise IdentificationError(
-                f"experiment '{self.name}': is not periodic, so that there are no periods to average"
-            )
+            reason = f"experiment '{self.name}': is not periodic, so that there are no periods to average"
+            raise IdentificationError(reason)
         ahead = self.counted_from if transient_samples is None else transient_samples
         means = [
             values.reshape(len(values), -1, self.period_samples).mean(axis=1)[
@@ -215,13 +214,10 @@ def same_channels(experiments: Sequence[Experiment]) -> None:
     for index, other in enumerate(experiments):
         what = f"experiments[{index}]{f' ({other.name})' if other.name else ''}"
         if abs(other.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
-            raise IdentificationError(
-                f"sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one",
-                where=what,
-            )
+            reason = f"sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one"
+            raise IdentificationError(reason, where=what)
         for name in ("input_channels", "output_channels"):
             mine, theirs = (tuple(c.name for c in getattr(e, name)) for e in (other, first))
             if mine != theirs:
-                raise IdentificationError(
-                    f"{name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}", where=what
-                )
+                reason = f"{name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}"
+                raise IdentificationError(reason, where=what)

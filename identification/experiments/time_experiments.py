@@ -75,9 +75,8 @@ def time_experiments(
     check_periods(records)
     rate = suitable_rate_hz(records) if rate_hz is None else positive("rate_hz", rate_hz, "Hz")
     if rate > records.sample_rate_hz * (1.0 + _SAME):
-        raise IdentificationError(
-            field="rate_hz", value=rate, allowed=f"up to {records.sample_rate_hz:g} Hz, as fast as was recorded"
-        )
+        allowed = f"up to {records.sample_rate_hz:g} Hz, as fast as was recorded"
+        raise IdentificationError(field="rate_hz", value=rate, allowed=allowed)
     return tuple(_experiment(records, record, into, out, rate) for record in records.records)
 
 

@@ -113,9 +113,8 @@ class TimeRecords(Result):
             if rows != len(names) or not count:
                 raise IdentificationError(f"record {number}: shape {(rows, count)}, needs {len(names)} rows of samples")
             if self.period_samples < 0 or (self.period_samples and count % self.period_samples):
-                raise IdentificationError(
-                    f"record {number}: has {count} samples, no whole number of periods of {self.period_samples}"
-                )
+                reason = f"record {number}: has {count} samples, no whole number of periods of {self.period_samples}"
+                raise IdentificationError(reason)
 
     @property
     def level_unit(self) -> str:

@@ -95,17 +95,15 @@ def hammer_test(
     data = [finite_array(f"records[{i}]", record, np.float64, 2) for i, record in enumerate(records)]
     for i, record in enumerate(data):
         if record.shape[0] != len(channels) or record.shape[1] < 16:
-            raise IdentificationError(
-                f"shape {record.shape}", field=f"records[{i}]", allowed=f"{len(channels)} channels by samples"
-            )
+            reason = f"shape {record.shape}"
+            raise IdentificationError(reason, field=f"records[{i}]", allowed=f"{len(channels)} channels by samples")
     IdentificationError.raise_if(not data, "is empty", field="records", allowed="at least one")
     blocks = blocks_of(data, channels, rate, record_s, pretrigger_s, trigger_n, full_scale)
     used = [block for block in blocks if not block.hit.fault]
     if len(used) < 2:
         faults = "; ".join(f"{block.hit.label}: {block.hit.fault}" for block in blocks if block.hit.fault)
-        raise IdentificationError(
-            f"{len(used)} of {len(blocks)} count", field="hits", allowed=f"two at least ({faults or 'no faults'})"
-        )
+        reason = f"{len(used)} of {len(blocks)} count"
+        raise IdentificationError(reason, field="hits", allowed=f"two at least ({faults or 'no faults'})")
     values = np.array([block.samples for block in used])
     motions = [row for row, channel in enumerate(channels) if channel.role in ("drive", "response")]
     if decay_rate_1_s is None:
@@ -143,12 +141,11 @@ def _band(
     lowest_hz = float(frequency_hz[min(_FIRST_LINES, frequency_hz.size - 1)]) if lowest_hz is None else lowest_hz
     lines = (frequency_hz >= lowest_hz) & (frequency_hz <= highest_hz) & (frequency_hz > 0.0)
     if np.count_nonzero(lines) < 3:
-        raise IdentificationError(
+        reason = (
             f"{np.count_nonzero(lines)} lines in {lowest_hz:g} to {highest_hz:g} Hz, which are "
-            f"{frequency_hz[1]:.3g} Hz apart",
-            field="lowest_hz, highest_hz",
-            allowed="3 at least",
+            f"{frequency_hz[1]:.3g} Hz apart"
         )
+        raise IdentificationError(reason, field="lowest_hz, highest_hz", allowed="3 at least")
     return np.asarray(lines)
 
 

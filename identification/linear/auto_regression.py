@@ -186,9 +186,8 @@ def regressed_responses(
     high = min(high, 0.499 * sample_rate_hz)
     low = max(low, (high - low) / _LINES)
     if not low < high:
-        raise IdentificationError(
-            f"is {low:g} to {high:g} Hz", field="band_hz", allowed="two rising values below half the sample rate"
-        )
+        reason = f"is {low:g} to {high:g} Hz"
+        raise IdentificationError(reason, field="band_hz", allowed="two rising values below half the sample rate")
     frequency = np.linspace(low, high, _LINES)
     value, covariance = found.responses(np.exp(2j * np.pi * frequency / sample_rate_hz))
     rms = np.sqrt(np.mean(np.hstack([u for u, _ in records]) ** 2, axis=1))
@@ -221,7 +220,6 @@ def _excited_band(records: Sequence[tuple[Float, Float]], sample_rate_hz: float)
     power = scipy.ndimage.uniform_filter1d(power, _SMOOTHED, axis=1, mode="nearest")
     inside = np.all(power >= _EXCITED**2 * power.max(axis=1, keepdims=True), axis=0) & (frequency > 0.0)
     if np.count_nonzero(inside) < 2:
-        raise IdentificationError(
-            "no band is excited at all of them", field="inputs", hint="excite them at the same frequencies"
-        )
+        reason = "no band is excited at all of them"
+        raise IdentificationError(reason, field="inputs", hint="excite them at the same frequencies")
     return float(frequency[inside][0]), float(frequency[inside][-1])

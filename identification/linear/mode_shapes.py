@@ -45,21 +45,17 @@ class ModeShapes:
         if self.shapes_std is not None:
             object.__setattr__(self, "shapes_std", read_only(self.shapes_std, np.float64))
             if np.shape(self.shapes_std) != shapes.shape:
-                raise IdentificationError(
-                    f"shape {np.shape(self.shapes_std)}, shapes have {shapes.shape}", field="shapes_std"
-                )
+                reason = f"shape {np.shape(self.shapes_std)}, shapes have {shapes.shape}"
+                raise IdentificationError(reason, field="shapes_std")
         if self.covariance is not None:
             covariance = finite_array("covariance", self.covariance, np.float64, 2)
             object.__setattr__(self, "covariance", covariance)
             if covariance.shape != (shapes.size, shapes.size):
-                raise IdentificationError(
-                    f"shape {covariance.shape} for {shapes.size} shape values", field="covariance"
-                )
+                reason = f"shape {covariance.shape} for {shapes.size} shape values"
+                raise IdentificationError(reason, field="covariance")
         if not shapes.shape[1] or np.linalg.matrix_rank(shapes) < shapes.shape[1]:
-            raise IdentificationError(
-                f"{shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes",
-                field="shapes",
-            )
+            reason = f"{shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes"
+            raise IdentificationError(reason, field="shapes")
         if not 0 <= self.mode < shapes.shape[1]:
             raise IdentificationError(field="mode", value=self.mode, allowed=f"0 to {shapes.shape[1] - 1}")
 

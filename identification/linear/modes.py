@@ -126,9 +126,8 @@ class LinearModes(Result):
         for name in ("frequency_hz", "damping_ratio", "shapes"):
             finite_array(name, getattr(self, name), np.float64, 2 if name == "shapes" else 1)
         if not modes or self.frequency_hz[0] <= 0.0 or np.any(np.diff(self.frequency_hz) <= 0.0):
-            raise IdentificationError(
-                field="frequency_hz", allowed="at least one, above zero, each above the one before"
-            )
+            allowed = "at least one, above zero, each above the one before"
+            raise IdentificationError(field="frequency_hz", allowed=allowed)
 
     @property
     def drive_row(self) -> int:
@@ -217,9 +216,8 @@ def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:
     names = [channel.name for channel in b.channels]
     common = [(row, names.index(channel.name)) for row, channel in enumerate(a.channels) if channel.name in names]
     if not common:
-        raise IdentificationError(
-            f"{', '.join(c.name for c in a.channels)} and {', '.join(names)} share none", field="channels"
-        )
+        reason = f"{', '.join(c.name for c in a.channels)} and {', '.join(names)} share none"
+        raise IdentificationError(reason, field="channels")
     x, y = a.shapes[[i for i, _ in common]], b.shapes[[j for _, j in common]]
     product = np.outer(np.sum(x**2, axis=0), np.sum(y**2, axis=0))
     return np.asarray((x.T @ y) ** 2 / np.where(product > 0.0, product, 1.0))

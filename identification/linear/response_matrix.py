@@ -66,9 +66,8 @@ class FrequencyResponseMatrix(Result):
             raise IdentificationError(field="outputs, inputs", allowed="at least one of each")
         object.__setattr__(self, "frequency_hz", finite_array("frequency_hz", self.frequency_hz, np.float64, 1))
         if not self.frequency_hz.size or self.frequency_hz[0] < 0.0 or np.any(np.diff(self.frequency_hz) <= 0.0):
-            raise IdentificationError(
-                field="frequency_hz", allowed="at least one, none below zero, each above the one before"
-            )
+            allowed = "at least one, none below zero, each above the one before"
+            raise IdentificationError(field="frequency_hz", allowed=allowed)
         paths = len(self.outputs) * len(self.inputs)
         shape = () if self.deviations is None else np.shape(self.deviations)
         records = shape[1] if len(shape) > 1 else 0

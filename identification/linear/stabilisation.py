@@ -148,9 +148,8 @@ def diagram(
         orders = [order for order in _ORDERS if order <= highest]
     tried = sorted(set(orders))
     if not tried or tried[0] < 1:
-        raise IdentificationError(
-            f"{tried or 'none'} for {lines} lines", field="orders", allowed=f"numbers from 1 to {most}"
-        )
+        reason = f"{tried or 'none'} for {lines} lines"
+        raise IdentificationError(reason, field="orders", allowed=f"numbers from 1 to {most}")
     space = observable_space(data, z, max(tried) + 2)
     band_hz = (data.frequency_hz[0], data.frequency_hz[-1])
     parts: list[tuple[NDArray[np.generic], ...]] = []

@@ -37,9 +37,8 @@ def poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
     """Return the poles of known modes in the band; raise `IdentificationError` if there is none."""
     inside = (modes.frequency_hz >= data.frequency_hz[0]) & (modes.frequency_hz <= data.frequency_hz[-1])
     if not np.any(inside):
-        raise IdentificationError(
-            f"none of those given is in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz", field="modes"
-        )
+        reason = f"none of those given is in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
+        raise IdentificationError(reason, field="modes")
     return np.concatenate([2.0 * np.pi * modes.frequency_hz[inside], np.abs(modes.damping_ratio[inside])])
 
 

@@ -118,9 +118,8 @@ def points_of(responses: FrequencyResponseMatrix, sample_rate_hz: float) -> Comp
         hint = "`linear_modes` takes such responses"
         raise IdentificationError(field="decay_rate_1_s", value=responses.decay_rate_1_s, allowed="0", hint=hint)
     if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
-        raise IdentificationError(
-            field="sample_rate_hz", value=sample_rate_hz, allowed=f"more than twice {responses.frequency_hz[-1]:g} Hz"
-        )
+        allowed = f"more than twice {responses.frequency_hz[-1]:g} Hz"
+        raise IdentificationError(field="sample_rate_hz", value=sample_rate_hz, allowed=allowed)
     return np.asarray(np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz))
 
 
@@ -155,9 +154,8 @@ def subspace(
     z = points_of(responses, sample_rate_hz)
     rows = order + 2 if block_rows is None else block_rows
     if (rows - 1) * len(responses.outputs) < order:
-        raise IdentificationError(
-            f"too few for order {order} of {len(responses.outputs)} outputs", field="block_rows", value=rows
-        )
+        reason = f"too few for order {order} of {len(responses.outputs)} outputs"
+        raise IdentificationError(reason, field="block_rows", value=rows)
     data = weighted_responses(responses, weighting)
     a, c = observable_space(data, z, rows).state_matrices(order)
     return _with_inputs(data, z, a, c)

@@ -42,9 +42,8 @@ def map_backbone(data: Any, mapping: BackboneMapping) -> Backbone:
     stored = [complex_at(data, c.value, 2, f"channels.{c.name}") for c in mapping.channels]
     for channel, values in zip(channels, stored, strict=True):
         if len(values) != frequency.size:
-            raise IdentificationError(
-                f"{len(values)} points for {frequency.size} frequencies", field=f"channels.{channel.name}"
-            )
+            reason = f"{len(values)} points for {frequency.size} frequencies"
+            raise IdentificationError(reason, field=f"channels.{channel.name}")
     width = max(values.shape[1] for values in stored)
     harmonics = np.zeros((frequency.size, len(channels), width + 1), dtype=np.complex128)
     scale = np.sqrt(2.0) if mapping.values == "rms" else 1.0

@@ -30,9 +30,8 @@ def value_at(data: Any, path: str, where: str) -> Any:
     if isinstance(data, Mapping) and path in data:
         return data[path]  # a name that itself contains dots or brackets
     if not _PATH.fullmatch(path):
-        raise IdentificationError(
-            f"{where}: '{path}' is no path; write names joined by dots, with [0] for list entries"
-        )
+        reason = f"{where}: '{path}' is no path; write names joined by dots, with [0] for list entries"
+        raise IdentificationError(reason)
     value = data
     walked = ""
     for match in _STEP.finditer(path):

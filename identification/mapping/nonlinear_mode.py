@@ -52,9 +52,8 @@ def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMod
     for name, path in columns.items():
         stored[name] = np.asarray(numbers(value_at(data, path, name), 1, f"{name} '{path}'"), dtype=np.float64)
         if not np.all(np.isfinite(stored[name])):
-            raise IdentificationError(
-                f"{name} '{path}': is not finite at [{int(np.argmin(np.isfinite(stored[name])))}]"
-            )
+            reason = f"{name} '{path}': is not finite at [{int(np.argmin(np.isfinite(stored[name])))}]"
+            raise IdentificationError(reason)
     if len({array.size for array in stored.values()}) > 1:
         sizes = ", ".join(f"{name} {array.size}" for name, array in stored.items())
         raise IdentificationError(f"unequal lengths ({sizes})", field="columns")
@@ -63,9 +62,8 @@ def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMod
     peak = np.sqrt(2.0) if mapping.values == "rms" else 1.0
     unit, factor = si_of(mapping.amplitude_unit, "amplitude_unit")
     if unit not in _ORDER:
-        raise IdentificationError(
-            field="amplitude_unit", value=mapping.amplitude_unit, allowed="a displacement, velocity or acceleration"
-        )
+        allowed = "a displacement, velocity or acceleration"
+        raise IdentificationError(field="amplitude_unit", value=mapping.amplitude_unit, allowed=allowed)
     amplitude = stored["amplitude"] * factor * peak / (2.0 * np.pi * frequency) ** _ORDER[unit]
     force_unit, force_factor = si_of(mapping.force_unit, "force_unit")
     IdentificationError.raise_if(force_unit != "N", field="force_unit", value=mapping.force_unit, allowed="a force")

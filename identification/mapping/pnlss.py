@@ -89,9 +89,8 @@ def _array(data: Any, mapping: PnlssMapping, name: str) -> Float:
 def _powers(data: Any, mapping: PnlssMapping, name: str, variables: int) -> NDArray[np.int64]:
     array = _array(data, mapping, name)
     if array.size and array.shape[-1:] != (variables,):
-        raise IdentificationError(
-            f"shape {array.shape}", field=name, allowed=f"{variables} columns: states, then inputs"
-        )
+        reason = f"shape {array.shape}"
+        raise IdentificationError(reason, field=name, allowed=f"{variables} columns: states, then inputs")
     powers = np.round(array).astype(np.int64)
     IdentificationError.raise_if(not np.array_equal(powers, array), "are no whole numbers", field=name)
     return powers.reshape(-1, variables)

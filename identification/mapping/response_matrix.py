@@ -88,9 +88,8 @@ def _paths(data: Any, mapping: ResponseMatrixMapping, lines: int) -> Any:
         if response.size != lines:
             raise IdentificationError(f"{response.size} values for {lines} frequencies", field=f"{where}.value")
         if not np.all(np.isfinite(response)):
-            raise IdentificationError(
-                f"is not finite at [{int(np.argmin(np.isfinite(response)))}]", field=f"{where}.value"
-            )
+            reason = f"is not finite at [{int(np.argmin(np.isfinite(response)))}]"
+            raise IdentificationError(reason, field=f"{where}.value")
         value[:, outputs.index(path.output), inputs.index(path.input)] = response
     missing = [f"{o} to {i}" for k, o in enumerate(outputs) for j, i in enumerate(inputs) if np.isnan(value[0, k, j])]
     if missing:

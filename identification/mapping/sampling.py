@@ -56,7 +56,6 @@ def common_rate_hz(told: Mapping[str, float | None]) -> float:
     lowest, highest = min(rates.values()), max(rates.values())
     if not lowest > 0.0 or not highest < np.inf or highest / lowest - 1.0 > _SAME:
         text = ", ".join(f"{name} {rate:g} Hz" for name, rate in rates.items())
-        raise IdentificationError(
-            f"disagrees ({text})", field="sample_rate_hz", hint="correct or leave out the wrong one"
-        )
+        reason = f"disagrees ({text})"
+        raise IdentificationError(reason, field="sample_rate_hz", hint="correct or leave out the wrong one")
     return next(iter(rates.values()))

@@ -40,9 +40,8 @@ def series(value: Any, axes: Sequence[str], index: int, where: str) -> Series:
     if "channel" in names:
         at = names.index("channel")
         if index > array.shape[at]:
-            raise IdentificationError(
-                f"the array has 1 to {array.shape[at]} (shape {array.shape})", field=f"{where}.index", value=index
-            )
+            reason = f"the array has 1 to {array.shape[at]} (shape {array.shape})"
+            raise IdentificationError(reason, field=f"{where}.index", value=index)
         array = np.take(array, index - 1, axis=at)
         names.pop(at)
     for name in ("level", "realisation", "period", "sample"):

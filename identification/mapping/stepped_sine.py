@@ -118,9 +118,8 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
             raise IdentificationError("the mapping has no [phase] table", field=f"{where}.phase", value=group.phase)
         levels = _levels(data, group, where)
         if group.level_values and len(group.level_values) != len(levels):
-            raise IdentificationError(
-                f"{len(group.level_values)} given, the data has {len(levels)} levels", field=f"{where}.level_values"
-            )
+            reason = f"{len(group.level_values)} given, the data has {len(levels)} levels"
+            raise IdentificationError(reason, field=f"{where}.level_values")
         found += [_response(level, index, group, mapping, where) for index, level in enumerate(levels)]
     return tuple(found)
 

@@ -139,13 +139,11 @@ class TimeDataMapping(MeasurementMapping):
         if (self.lowest_hz is None) != (self.highest_hz is None):
             raise ValueError("lowest_hz and highest_hz: give both or none")
         if self.lowest_hz is not None and self.highest_hz is not None and self.lowest_hz >= self.highest_hz:
-            raise InputError(
-                field="lowest_hz", value=self.lowest_hz, allowed=f"below `highest_hz` = {self.highest_hz:g}"
-            )
+            allowed = f"below `highest_hz` = {self.highest_hz:g}"
+            raise InputError(field="lowest_hz", value=self.lowest_hz, allowed=allowed)
         if self.transient_periods and not self.is_periodic:
-            raise InputError(
-                "is for periodic data", field="transient_periods", hint="add period_samples, or leave it out"
-            )
+            reason = "is for periodic data"
+            raise InputError(reason, field="transient_periods", hint="add period_samples, or leave it out")
         return self
 
     @property

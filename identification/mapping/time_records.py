@@ -54,9 +54,8 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         raw += _raw_records({name: some[number] for name, some in entries.items()}, every, mapping, where)
     rate = raw[0].rate_hz
     if any(abs(one.rate_hz / rate - 1.0) > 1e-6 for one in raw):
-        raise IdentificationError(
-            f"records have rates from {rate:g} Hz on", field="sample_rate_hz", hint="wanted is one"
-        )
+        reason = f"records have rates from {rate:g} Hz on"
+        raise IdentificationError(reason, field="sample_rate_hz", hint="wanted is one")
     cut, notes = _cut(raw, mapping, rate)
     channels, _ = in_si(mapping.channels)
     forces = [row for row, channel in enumerate(channels) if channel.role == "force"]
@@ -122,9 +121,8 @@ def _raw_records(
     periods = {one.period_samples for one in found} - {0}
     if len(periods) > 1 or (periods and mapping.period_samples not in (None, *periods)):
         lengths = ", ".join(map(str, sorted({*periods, mapping.period_samples or 0} - {0})))
-        raise IdentificationError(
-            f"disagree ({lengths}), wanted is one length of a period", where=where, field="period_samples"
-        )
+        reason = f"disagree ({lengths}), wanted is one length of a period"
+        raise IdentificationError(reason, where=where, field="period_samples")
     together = common_length(
         [one.values for one in found],
         skipped,
@@ -180,9 +178,8 @@ def _cut(raw: Sequence[_Raw], mapping: TimeDataMapping, rate_hz: float) -> tuple
     """Return the stretches of all records at the new rate, of periodic records the settled whole periods."""
     ratio = 1.0 if mapping.new_rate_hz is None else mapping.new_rate_hz / rate_hz
     if ratio > 1.0 + 1e-9:
-        raise IdentificationError(
-            f"the data has {rate_hz:g} Hz", field="new_rate_hz", value=mapping.new_rate_hz, allowed="up to that"
-        )
+        reason = f"the data has {rate_hz:g} Hz"
+        raise IdentificationError(reason, field="new_rate_hz", value=mapping.new_rate_hz, allowed="up to that")
     found, left, groups = [], 0, 1 + max(one.group for one in raw)
     for number, one in enumerate(raw, 1):
         samples, first = one.samples, 0.0
@@ -220,9 +217,8 @@ def _stretches(stretches: Sequence[Stretch], size: int, rate_hz: float, number: 
             at = begin + turn * step
             end = size if length is None else at + length
             if end > size or at >= end:
-                raise IdentificationError(
-                    f"ends at sample {max(end, at)}, record {number} has {size} samples", field=f"stretches[{which}]"
-                )
+                reason = f"ends at sample {max(end, at)}, record {number} has {size} samples"
+                raise IdentificationError(reason, field=f"stretches[{which}]")
             found.append((at, end, which))
     return found
 
@@ -275,10 +271,8 @@ def _named(cut: Sequence[_Raw], mapping: TimeDataMapping, force: Sequence[int], 
     groups = sorted({one.group for one in cut})
     levels = mapping.levels
     if levels is not None and len(levels) not in (len(groups), len(cut)):
-        raise IdentificationError(
-            f"has {len(levels)} numbers, the data has {len(groups)} levels and {len(cut)} records; one for each",
-            field="levels",
-        )
+        reason = f"has {len(levels)} numbers, the data has {len(groups)} levels and {len(cut)} records; one for each"
+        raise IdentificationError(reason, field="levels")
     records: list[TimeRecord] = []
     for number, one in enumerate(cut):
         alike = [other for other in cut if other.group == one.group]

@@ -90,10 +90,8 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     rows = chosen("inputs", spectra.channels, inputs, ("force",))
     lines = spectra.spectra[..., spectra.excited].reshape(-1, len(spectra.channels), int(spectra.excited.sum()))
     if lines.shape[0] <= len(rows):
-        raise IdentificationError(
-            f"make {lines.shape[0]} records, a coherence with {len(rows)} inputs needs more than that",
-            field="periods, realisations",
-        )
+        reason = f"make {lines.shape[0]} records, a coherence with {len(rows)} inputs needs more than that"
+        raise IdentificationError(reason, field="periods, realisations")
     y, u = lines[:, spectra.index(output)], lines[:, rows]
     sizes = np.sqrt(np.sum(np.abs(lines) ** 2, axis=0))[[spectra.index(output), *rows]]
     if np.any(sizes == 0.0):
@@ -105,8 +103,7 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     dependent = np.linalg.eigvalsh(powers)[:, 0] < _DEPENDENT
     if np.any(dependent):
         where = spectra.frequency_hz[spectra.excited][int(np.argmax(dependent))]
-        raise IdentificationError(
-            f"depend on each other at {where:g} Hz, their shares cannot be separated", field="inputs"
-        )
+        reason = f"depend on each other at {where:g} Hz, their shares cannot be separated"
+        raise IdentificationError(reason, field="inputs")
     found = np.einsum("ki,kij,kj->k", cross, np.linalg.inv(powers), np.conj(cross)).real
     return np.asarray(np.clip(found, 0.0, 1.0))

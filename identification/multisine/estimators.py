@@ -57,9 +57,8 @@ def estimated_responses(
     y, u = values[:, :, rows], values[:, :, columns]
     names = [channels[column].name for column in columns]
     if y.shape[0] % len(names):
-        raise IdentificationError(
-            f"are {y.shape[0]}, need a multiple of the {len(names)} inputs {', '.join(names)}", field="realisations"
-        )
+        reason = f"are {y.shape[0]}, need a multiple of the {len(names)} inputs {', '.join(names)}"
+        raise IdentificationError(reason, field="realisations")
     z, label = _instruments(channels, values.mean(axis=1), rows, columns, estimator, instruments)
     weights = _weights(u.mean(axis=1), z, frequency_hz, label)
     value = np.einsum(
@@ -96,9 +95,8 @@ def chosen(what: str, channels: Sequence[Channel], names: Sequence[str] | None, 
         rows = [find_name(channels, name) for name in names]
     if not rows or len(set(rows)) < len(rows):
         asked = f"no channel of role {' or '.join(roles)}" if names is None else ", ".join(names) or "none given"
-        raise IdentificationError(
-            asked, field=what, allowed=f"one or more, each once, of {', '.join(channel.name for channel in channels)}"
-        )
+        allowed = f"one or more, each once, of {', '.join(channel.name for channel in channels)}"
+        raise IdentificationError(asked, field=what, allowed=allowed)
     return rows
 
 

@@ -99,9 +99,8 @@ class PeriodicSpectra(Result):
         """bool[n_lines], whether a line is an even multiple of the resolution."""
         steps = np.diff(self.frequency_hz)
         if not steps.size or np.ptp(steps) > 1e-6 * steps[0]:
-            raise IdentificationError(
-                field="frequency_hz", allowed="two lines or more, all neighbours equally far apart"
-            )
+            allowed = "two lines or more, all neighbours equally far apart"
+            raise IdentificationError(field="frequency_hz", allowed=allowed)
         lines = self.frequency_hz / steps.mean()
         if np.any(np.abs(lines - np.round(lines)) > 1e-3):
             raise IdentificationError(f"lines {steps[0]:g} Hz apart are no multiples of that", field="frequency_hz")

@@ -101,10 +101,8 @@ def _identified(
     squared = omega**2 + stiffness.real
     if np.any(squared <= 0.0):
         worst = int(np.argmin(squared))
-        raise IdentificationError(
-            f"{shape:g} gives no real modal frequency at {frequency[worst]:g} Hz; check it and the units",
-            field="drive_mode_shape",
-        )
+        reason = f"{shape:g} gives no real modal frequency at {frequency[worst]:g} Hz; check it and the units"
+        raise IdentificationError(reason, field="drive_mode_shape")
     modal = np.sqrt(squared)
     lag = np.degrees(np.angle(force * np.conj(motion)))
     q = np.abs(own) / abs(shape)

@@ -145,12 +145,11 @@ def _used(level: FrequencyResponse, window_deg: float, name: str) -> NDArray[np.
         used &= away_deg <= 90.0
     distinct = np.unique(level.frequency_hz[used]).size
     if distinct < _MIN_POINTS:
-        raise IdentificationError(
+        reason = (
             f"points at {distinct} frequencies of {held.size} points have a lag of 0 to 180 deg and the "
-            f"response at its level within {100 * _LEVEL_TOLERANCE:g} %",
-            where=name,
-            allowed=f"at least {_MIN_POINTS}",
+            f"response at its level within {100 * _LEVEL_TOLERANCE:g} %"
         )
+        raise IdentificationError(reason, where=name, allowed=f"at least {_MIN_POINTS}")
     return used
 
 

@@ -44,9 +44,8 @@ class ErrorModel:
 
     def __post_init__(self) -> None:
         if self.draws != 0 and self.draws < 100:
-            raise IdentificationError(
-                field="draws", value=self.draws, allowed="at least 100, or 0 for no standard errors"
-            )
+            allowed = "at least 100, or 0 for no standard errors"
+            raise IdentificationError(field="draws", value=self.draws, allowed=allowed)
 
     def per_channel(self, name: str, backbone: Backbone) -> Float:
         """float[n_channels]: the field ``name`` of each channel; raises `IdentificationError` for unknown channels."""
@@ -54,9 +53,8 @@ class ErrorModel:
         names = [channel.name for channel in backbone.channels]
         if isinstance(given, Mapping):
             if unknown := set(given) - set(names):
-                raise IdentificationError(
-                    f"no channel '{sorted(unknown)[0]}'", field=name, hint=f"channels: {', '.join(names)}"
-                )
+                reason = f"no channel '{sorted(unknown)[0]}'"
+                raise IdentificationError(reason, field=name, hint=f"channels: {', '.join(names)}")
             values = np.array([float(given.get(channel, 0.0)) for channel in names])
         else:
             values = np.full(len(names), float(given))

@@ -120,9 +120,8 @@ def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
     """
     for response in responses:
         if response.controlled != "response":
-            raise IdentificationError(
-                f"'{response.label}' held {response.controlled}, must hold the response", field="responses"
-            )
+            reason = f"'{response.label}' held {response.controlled}, must hold the response"
+            raise IdentificationError(reason, field="responses")
     points = _by_level(responses)
     if len(points) < LEAST_LEVELS:
         raise IdentificationError(f"{len(points)} levels", field="responses", allowed=f"at least {LEAST_LEVELS}")
@@ -157,9 +156,8 @@ def _fits(points: Sequence[LevelPoints]) -> tuple[LevelFit, ...]:
     fits.sort(key=lambda fit: fit.amplitude_m)
     for lower, upper in pairwise(fits):
         if upper.amplitude_m <= lower.amplitude_m * (1.0 + _SAME_LEVEL):
-            raise IdentificationError(
-                f"two levels have the same amplitude of {upper.amplitude_m:g} m", field="responses"
-            )
+            reason = f"two levels have the same amplitude of {upper.amplitude_m:g} m"
+            raise IdentificationError(reason, field="responses")
     return tuple(fits)
 
 

@@ -90,9 +90,8 @@ def check_level(points: LevelPoints, name: str) -> None:
     if omega.size < _LEAST_POINTS:
         raise IdentificationError(f"{omega.size} points", where=name, allowed=f"at least {_LEAST_POINTS}")
     if not np.ptp(omega) > 1e-9 * omega.max():
-        raise IdentificationError(
-            f"all points at {omega[0] / (2.0 * np.pi):g} Hz", where=name, allowed="several frequencies"
-        )
+        reason = f"all points at {omega[0] / (2.0 * np.pi):g} Hz"
+        raise IdentificationError(reason, where=name, allowed="several frequencies")
     lags = np.degrees(np.angle(points.stiffness))
     if not np.any(lags >= 90.0) or not np.any((lags > 0.0) & (lags <= 90.0)):
         raise IdentificationError(

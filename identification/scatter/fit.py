@@ -78,9 +78,8 @@ def fit_with_scatter(
     same_channels(everything)
     named = [f"run {index + 1}" for index in range(len(everything))] if runs is None else list(runs)
     if len(named) != len(everything):
-        raise IdentificationError(
-            f"are {len(named)} names", field="runs", allowed=f"{len(everything)}, one for each experiment"
-        )
+        reason = f"are {len(named)} names"
+        raise IdentificationError(reason, field="runs", allowed=f"{len(everything)}, one for each experiment")
     names = tuple(dict.fromkeys(named))
     if len(names) < 2:
         raise IdentificationError("is one", field="runs", allowed="two at least to tell what changes from run to run")

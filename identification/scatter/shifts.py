@@ -56,10 +56,8 @@ def effects_of(
     modes = [mode for mode, f in enumerate(frequency) if band[0] <= f <= band[1]]
     if not modes and set(kinds) != {"gain"}:
         found = ", ".join(f"{f:.4g}" for f in frequency) or "none"
-        raise IdentificationError(
-            f"the model has modes at {found} Hz, none in the excited band of {band[0]:g} to {band[1]:g} Hz",
-            field="scatter",
-        )
+        reason = f"the model has modes at {found} Hz, none in the excited band of {band[0]:g} to {band[1]:g} Hz"
+        raise IdentificationError(reason, field="scatter")
     of_modes = [Effect(kind, mode) for kind in kinds if kind != "gain" for mode in modes]
     return (*of_modes, *[Effect("gain")] * ("gain" in kinds))
 

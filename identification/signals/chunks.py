@@ -66,9 +66,8 @@ def rising_steps(theta: Float, first: int = 0) -> Float:
     steps = np.diff(theta)
     if np.any(steps <= 0.0):
         where = first + int(np.argmax(steps <= 0.0))
-        raise IdentificationError(
-            f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
-        )
+        reason = f"does not rise from [{where}] to [{where + 1}], must rise with time"
+        raise IdentificationError(reason, field="theta_rad")
     return steps
 
 

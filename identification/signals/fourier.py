@@ -169,9 +169,8 @@ def _lost(lost: ArrayLike | None, size: int) -> NDArray[np.bool_]:
 
 def _refuse_lost(lost: int, size: int) -> None:
     if lost > _MOST_LOST * size:
-        raise IdentificationError(
-            f"{lost} of {size} were lost", field="samples", allowed=f"up to {100.0 * _MOST_LOST:g} %"
-        )
+        reason = f"{lost} of {size} were lost"
+        raise IdentificationError(reason, field="samples", allowed=f"up to {100.0 * _MOST_LOST:g} %")
 
 
 def _per_channel(name: str, given: ArrayLike | None, channels: int) -> Float:
@@ -192,15 +191,12 @@ def _whole_periods(phase: Phase, size: int, rate_hz: float, harmonics: int) -> t
     covered = size * step / (2.0 * np.pi)
     periods = int(covered + step / (2.0 * np.pi) + 1e-6)
     if periods < 1:
-        raise IdentificationError(
-            f"covers {covered:.3f} periods", field="theta_rad", allowed="at least one whole period"
-        )
+        reason = f"covers {covered:.3f} periods"
+        raise IdentificationError(reason, field="theta_rad", allowed="at least one whole period")
     needed = 2 * harmonics + 2
     if 2.0 * np.pi / step <= needed:
-        raise IdentificationError(
-            f"{harmonics} need more than {needed} samples per period, the record has {2 * np.pi / step:.2f}",
-            field="harmonics",
-        )
+        reason = f"{harmonics} need more than {needed} samples per period, the record has {2 * np.pi / step:.2f}"
+        raise IdentificationError(reason, field="harmonics")
     count = phase.samples_below(2.0 * np.pi * periods - 0.5 * step)
     warnings = []
     if size - count > _SAMPLES_TO_SPARE:

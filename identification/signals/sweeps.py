@@ -140,8 +140,6 @@ def _sorted(one: float, other: float) -> Band:
 def _within(frequency: Float, band: Band, name: str) -> NDArray[np.bool_]:
     inside = (frequency >= band[0]) & (frequency <= band[1])
     if not inside.any():
-        raise IdentificationError(
-            f"is {band[0]:g} to {band[1]:g} Hz, the sweep covers {frequency.min():.4g} to {frequency.max():.4g} Hz",
-            field=name,
-        )
+        reason = f"is {band[0]:g} to {band[1]:g} Hz, the sweep covers {frequency.min():.4g} to {frequency.max():.4g} Hz"
+        raise IdentificationError(reason, field=name)
     return np.asarray(inside)

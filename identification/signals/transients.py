@@ -65,13 +65,11 @@ class Transient(Result):
         shape = (len(self.channels), self.time_s.size)
         object.__setattr__(self, "fundamentals", shaped_array("fundamentals", self.fundamentals, np.complex128, shape))
         if self.frequency_hz.shape != self.time_s.shape:
-            raise IdentificationError(
-                f"{self.frequency_hz.size} values for {self.time_s.size} instants", field="frequency_hz"
-            )
+            reason = f"{self.frequency_hz.size} values for {self.time_s.size} instants"
+            raise IdentificationError(reason, field="frequency_hz")
         if not self.time_s.size or np.any(np.diff(self.time_s) <= 0.0):
-            raise IdentificationError(
-                f"{self.time_s.size} instants", field="time_s", allowed="at least one, and rising ones"
-            )
+            reason = f"{self.time_s.size} instants"
+            raise IdentificationError(reason, field="time_s", allowed="at least one, and rising ones")
 
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
@@ -147,9 +145,8 @@ def _largest_step(theta: Float, periods: int) -> float:
     covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
     needed = 2 * periods + 1
     if covered < needed:
-        raise IdentificationError(
-            f"covers {covered:.2f} periods", field="theta_rad", allowed=f"{needed} with periods = {periods}"
-        )
+        allowed = f"{needed} with periods = {periods}"
+        raise IdentificationError(f"covers {covered:.2f} periods", field="theta_rad", allowed=allowed)
     per_period = 2.0 * np.pi / float(steps.max())
     if per_period < _MIN_SAMPLES_PER_PERIOD:
         reason = f"{per_period:.2f} samples in the shortest period"

@@ -187,9 +187,8 @@ def _levels(up: SlowFlow, down: SlowFlow, levels_m: ArrayLike | None, number: in
         return np.geomspace(low, high, number)
     levels: Float = finite_array("levels_m", levels_m, np.float64, 1)
     if not levels.size or levels.min() < low or levels.max() > high:
-        raise IdentificationError(
-            f"both ramps cover {low:.4g} to {high:.4g} m, {levels_m} was asked for", field="levels_m"
-        )
+        reason = f"both ramps cover {low:.4g} to {high:.4g} m, {levels_m} was asked for"
+        raise IdentificationError(reason, field="levels_m")
     return levels
 
 
@@ -290,9 +289,8 @@ def _wide_enough(size: Float, level: float, bandwidth: float) -> float:
     while np.count_nonzero(np.abs(size - level) < width) < _FEWEST_INSTANTS:
         width *= _WIDEN
         if width > _WIDEST:
-            raise IdentificationError(
-                f"fewer than {_FEWEST_INSTANTS} instants near {np.exp(level):.4g} m; ramp more slowly", field="levels_m"
-            )
+            reason = f"fewer than {_FEWEST_INSTANTS} instants near {np.exp(level):.4g} m; ramp more slowly"
+            raise IdentificationError(reason, field="levels_m")
     return width
 
 

@@ -87,10 +87,8 @@ class SlowFlow:
         """Return the instants from ``start_s`` to ``stop_s``."""
         inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
         if not inside.any():
-            raise IdentificationError(
-                f"no instant from {start_s:g} to {stop_s:g} s; there are some from {self.time_s[0]:g} to {self.time_s[-1]:g} s",
-                field="start_s, stop_s",
-            )
+            there = f"there are some from {self.time_s[0]:g} to {self.time_s[-1]:g} s"
+            raise IdentificationError(f"no instant from {start_s:g} to {stop_s:g} s; {there}", field="start_s, stop_s")
         return self.select(inside)
 
     def select(self, keep: NDArray[np.bool_]) -> "SlowFlow":
@@ -281,10 +279,8 @@ def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_perio
         raise IdentificationError(f"covers {covered:.2f} periods", field="theta_rad", allowed=allowed)
     needed = 2 * harmonics + 2
     if (per_period := 2.0 * np.pi / float(steps.max())) <= needed:
-        raise IdentificationError(
-            f"{harmonics} need more than {needed} samples per period, the record has {per_period:.2f}",
-            field="harmonics",
-        )
+        reason = f"{harmonics} need more than {needed} samples per period, the record has {per_period:.2f}"
+        raise IdentificationError(reason, field="harmonics")
     half = np.pi * WINDOW_PERIODS
     count = int((theta[-1] - theta[0] - 2.0 * half) / (2.0 * np.pi) * points_per_period)
     return np.asarray(theta[0] + half + 2.0 * np.pi / points_per_period * np.arange(count + 1))

@@ -71,9 +71,8 @@ def _ratios(force_harmonics: ForceHarmonics, harmonics: int) -> dict[int, comple
         for order, ratio in force_harmonics.items():
             _check_order("force_harmonics: harmonic", order, harmonics)
             if not (isinstance(ratio, Number) and np.isfinite(complex(ratio))):
-                raise InputError(
-                    field=f"force_harmonics[{order}]", value=ratio, allowed="a finite number, real or complex"
-                )
+                allowed = "a finite number, real or complex"
+                raise InputError(field=f"force_harmonics[{order}]", value=ratio, allowed=allowed)
         return {int(order): complex(ratio) for order, ratio in force_harmonics.items()}
     _check_order("force_harmonics", force_harmonics, harmonics)
     return dict.fromkeys(range(2, force_harmonics + 1), 0j)

@@ -52,9 +52,8 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
     frequencies = positive("frequencies_hz", frequencies_hz)
     plant, points, rate_hz = rig.plant, rig.structure.points, rig.converter.sample_rate_hz
     if held and np.max(frequencies) >= 0.5 * rate_hz:
-        raise InputError(
-            field="frequencies_hz", value=np.max(frequencies), allowed=f"below {0.5 * rate_hz:g}, half the sample rate"
-        )
+        allowed = f"below {0.5 * rate_hz:g}, half the sample rate"
+        raise InputError(field="frequencies_hz", value=np.max(frequencies), allowed=allowed)
     s = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
     if held:  # (e^{sT} - e^{AT})^-1 Gamma: state at the sample instants
         phi = phi_matrices(plant.dynamics, plant.voltage_column[:, None], 1.0 / rate_hz)

@@ -133,17 +133,15 @@ class _Table(LocalElement):
         z = np.array(self.deflection_m)
         if not (z[0] < 0.0 < z[-1] and 0.0 in self.deflection_m and np.all(np.diff(z) > 0.0)):
             shown = f"{z[0]:g} to {z[-1]:g}"
-            raise InputError(
-                field="deflection_m", value=shown, allowed="rising numbers from below 0 to above 0, with 0 itself"
-            )
+            allowed = "rising numbers from below 0 to above 0, with 0 itself"
+            raise InputError(field="deflection_m", value=shown, allowed=allowed)
         return self
 
     def _check_length(self, name: str) -> None:
         values = getattr(self, name)
         if len(values) != len(self.deflection_m):
-            raise InputError(
-                f"has {len(values)} values", field=name, allowed=f"{len(self.deflection_m)}, one per deflection_m"
-            )
+            reason = f"has {len(values)} values"
+            raise InputError(reason, field=name, allowed=f"{len(self.deflection_m)}, one per deflection_m")
 
     @property
     def nodes_m(self) -> NDArray[np.float64]:

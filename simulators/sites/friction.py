@@ -39,9 +39,8 @@ class JenkinsSite(_Site):
     @model_validator(mode="after")
     def _pairs(self) -> "JenkinsSite":
         if len(self.slip) != len(self.stiffness):
-            raise InputError(
-                f"has {len(self.slip)} values", field="slip", allowed=f"{len(self.stiffness)}, one per stiffness"
-            )
+            reason = f"has {len(self.slip)} values"
+            raise InputError(reason, field="slip", allowed=f"{len(self.stiffness)}, one per stiffness")
         return self
 
     @property

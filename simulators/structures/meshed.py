@@ -93,9 +93,8 @@ class MeshedBeam(Part):
         n_mode, most = len(self.damping_ratio), self._most_modes()
         InputError.raise_if(n_mode > most, f"has {n_mode} modes", field="damping_ratio", allowed=f"1 to {most}")
         if self.frequency_hz is not None and len(self.frequency_hz) != n_mode:
-            raise InputError(
-                f"has {len(self.frequency_hz)} values", field="frequency_hz", allowed=f"{n_mode}, one per damping_ratio"
-            )
+            reason = f"has {len(self.frequency_hz)} values"
+            raise InputError(reason, field="frequency_hz", allowed=f"{n_mode}, one per damping_ratio")
         check_rising(self.frequency_hz or ())
         return self
 
@@ -139,6 +138,5 @@ def check_rising(frequencies_hz: Sequence[float]) -> None:
     """Raise `ValueError` if frequencies do not rise, because shapes and damping would then belong to other modes."""
     for index, (before_hz, next_hz) in enumerate(pairwise(frequencies_hz), start=1):
         if next_hz < before_hz:
-            raise InputError(
-                field=f"frequency_hz[{index}]", value=next_hz, allowed=f"from {before_hz:g} on, lowest first"
-            )
+            allowed = f"from {before_hz:g} on, lowest first"
+            raise InputError(field=f"frequency_hz[{index}]", value=next_hz, allowed=allowed)

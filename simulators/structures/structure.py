@@ -80,9 +80,8 @@ class LapJointedBeam(MeshedBeam):
     @model_validator(mode="after")
     def _lap_fits(self) -> "LapJointedBeam":
         if not self.lap_length_m < self.length_m:
-            raise InputError(
-                field="lap_length_m", value=self.lap_length_m, allowed=f"less than `length_m` = {self.length_m!r}"
-            )
+            allowed = f"less than `length_m` = {self.length_m!r}"
+            raise InputError(field="lap_length_m", value=self.lap_length_m, allowed=allowed)
         first, last = (self.length_m - self.lap_length_m) / 2.0, (self.length_m + self.lap_length_m) / 2.0
         named = {f"sites_m.{name}": position_m for name, position_m in self.sites_m.items()}
         named |= {f"bolts_m[{index}]": position_m for index, position_m in enumerate(self.bolts_m)}
