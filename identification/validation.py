@@ -1,5 +1,6 @@
 """Checks that every measurement type of this package shares."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,12 @@ def finite(name: str, array: NDArray[Any]) -> NDArray[Any]:
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise IdentificationError(f"value at {list(index)} is {array[index]}", field=name, allowed="finite")
     return array
+
+
+def table_rows(columns: Mapping[str, ArrayLike]) -> list[dict[str, float | None]]:
+    """Return one JSON-able dictionary per row of columns of equal length, with None for what is not finite."""
+    rows = zip(*map(np.asarray, columns.values()), strict=True)
+    return [{name: float(v) if np.isfinite(v) else None for name, v in zip(columns, row, strict=True)} for row in rows]
 
 
 def positive(name: str, value: float, unit: str = "") -> float:

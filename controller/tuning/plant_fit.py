@@ -189,13 +189,7 @@ def _derivatives(x: Float, s: Complex, centre: float) -> tuple[Complex, Complex]
     beta = (x[9] + z * (x[10] + z * (x[11] + z * x[12]))) / z**2
     powers = z ** np.arange(-2, 4)[:, None]
     of_accelerance = np.zeros((x.size, z.size), np.complex128)
-    of_accelerance[:5] = (
-        -mode / pole * (damped + 2.0 * w**2),
-        -mode / pole * damped,
-        mode,
-        np.ones_like(z),
-        z**2,
-    )
+    of_accelerance[:5] = (-mode / pole * (damped + 2.0 * w**2), -mode / pole * damped, mode, np.ones_like(z), z**2)
     of_exciter = beta * of_accelerance
     of_exciter[5:9] += powers[2:]
     of_exciter[9:] += powers[:4] * accelerance

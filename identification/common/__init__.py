@@ -1,4 +1,4 @@
-"""What callers share with the library: roles of channels, checks of arguments, and the stored form of results."""
+"""What callers share with the library: roles of channels, checks, options, parts of results, and the stored form of results."""
 
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,12 @@ if TYPE_CHECKING:
         chosen_rows as chosen_rows,
         find_role as find_role,
     )
+    from identification.decays.with_force import decay_with_force as decay_with_force
     from identification.frequency_responses import Controlled as Controlled
+    from identification.linear.accelerance import Weighting as Weighting
+    from identification.multisine.estimators import Estimator as Estimator
+    from identification.nonlinear.nonlinear_modes import QUANTITIES as QUANTITIES, STANDARD_ERRORS as STANDARD_ERRORS
+    from identification.response_control.levels import LevelFit as LevelFit
     from identification.storage import (
         Arrays as Arrays,
         Attributes as Attributes,

@@ -61,9 +61,7 @@ class PnlssErrors:
 
 
 def errors_of(
-    model: Simulator,
-    experiments: Sequence[Experiment],
-    simulate: Callable[[Experiment], Simulation] | None = None,
+    model: Simulator, experiments: Sequence[Experiment], simulate: Callable[[Experiment], Simulation] | None = None
 ) -> PnlssErrors:
     """Simulate each experiment, by default with `simulated`, and compare.
 

@@ -22,7 +22,7 @@ from identification.errors import IdentificationError
 from identification.linear.mode_shapes import ModeShapes
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.storage import stored
-from identification.validation import finite_array
+from identification.validation import finite_array, table_rows
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -202,10 +202,7 @@ class LinearModes(Result):
     def table(self) -> list[dict[str, float | None]]:
         """Return one JSON-able dictionary per mode, with None for unknown values."""
         names = (*_POLES[:4], "drive_shape", "phase_collinearity")
-        return [
-            {name: float(v) if np.isfinite(v := getattr(self, name)[mode]) else None for name in names}
-            for mode in range(self.frequency_hz.size)
-        ]
+        return table_rows({name: getattr(self, name) for name in names})
 
 
 def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:

@@ -7,15 +7,7 @@ from pydantic import Field, model_validator
 
 from identification.hammer.hammer_test import hammer_test
 from identification.hammer.result import HammerTest
-from identification.mapping.base import (
-    MeasurementMapping,
-    NotNegative,
-    Path,
-    Positive,
-    check_names,
-    entries_at,
-    in_si,
-)
+from identification.mapping.base import MeasurementMapping, NotNegative, Path, Positive, check_names, entries_at, in_si
 from identification.mapping.sampling import SignalMapping, common_rate_hz, instants_at, rate_of_file_hz, stored_records
 
 

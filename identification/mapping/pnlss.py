@@ -46,14 +46,7 @@ def map_pnlss(data: Any, mapping: PnlssMapping) -> PnlssModel:
     a = _array(data, mapping, "A")
     n = round(float(np.sqrt(a.size)))
     xpowers, ypowers = (_powers(data, mapping, name, n + m) for name in ("xpowers", "ypowers"))
-    shapes = {
-        "a": (n, n),
-        "b": (n, m),
-        "c": (p, n),
-        "d": (p, m),
-        "e": (n, len(xpowers)),
-        "f": (p, len(ypowers)),
-    }
+    shapes = {"a": (n, n), "b": (n, m), "c": (p, n), "d": (p, m), "e": (n, len(xpowers)), "f": (p, len(ypowers))}
     matrices: dict[str, Any] = {}
     for name, shape in shapes.items():
         array = _array(data, mapping, name.upper())

@@ -15,15 +15,7 @@ from pydantic import Field
 from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
 from identification.errors import IdentificationError
 from identification.frequency_responses import Controlled, FrequencyResponse
-from identification.mapping.base import (
-    MappingTable,
-    MeasurementMapping,
-    Path,
-    Positive,
-    as_levels,
-    numbers,
-    value_at,
-)
+from identification.mapping.base import MappingTable, MeasurementMapping, Path, Positive, as_levels, numbers, value_at
 from identification.mapping.units import si_of
 from vibrolock.arrays import Complex
 

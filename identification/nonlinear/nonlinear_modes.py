@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.storage import stored
-from identification.validation import read_only
+from identification.validation import read_only, table_rows
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -217,8 +217,7 @@ class NonlinearMode(Result):
         columns["damping_ratio_bound_95"] = self.bound_95("damping_ratio")
         columns["f2_over_f1"] = self.force_harmonic_ratio(2)
         columns["f3_over_f1"] = self.force_harmonic_ratio(3)
-        rows = range(len(self.force_n))
-        return [{name: _number(values[row]) for name, values in columns.items()} for row in rows]
+        return table_rows(columns)
 
 
 _ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if get_origin(entry.type) is np.ndarray)
@@ -244,7 +243,3 @@ def _slopes(along: Float, values: Float) -> Float:
         if first != last:
             out[number] = (values[last] - values[first]) / (along[last] - along[first])
     return out
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

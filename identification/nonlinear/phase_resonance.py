@@ -116,13 +116,7 @@ def nonlinear_mode(
     alone = mode_shapes is None
     return NonlinearMode(
         **found,
-        **propagated(
-            states,
-            backbone,
-            rows,
-            mode_shapes,
-            ErrorModel(calibration_std, phase_skew_std_deg, draws, seed),
-        ),
+        **propagated(states, backbone, rows, mode_shapes, ErrorModel(calibration_std, phase_skew_std_deg, draws, seed)),
         frequency_hz=backbone.frequency_hz,
         force_harmonics=states.force,
         response_harmonics_m=states.drive_m,

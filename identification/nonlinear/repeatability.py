@@ -14,6 +14,7 @@ from identification.backbones import Backbone
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
 from identification.nonlinear.phase_resonance import nonlinear_mode
+from identification.validation import table_rows
 from vibrolock.arrays import Complex, Float
 
 
@@ -81,10 +82,7 @@ class Repeatability:
             columns[f"{name}_std"] = self.std(name)
             columns[f"{name}_range"] = self.range(name)
             columns[f"{name}_between"] = self.between(name)
-        return [
-            {name: float(v) if np.isfinite(v := values[row]) else None for name, values in columns.items()}
-            for row in range(self.amplitude_m.size)
-        ]
+        return table_rows(columns)
 
     def _runs(self, quantity: str) -> Float:
         if quantity not in ("modal_frequency_hz", "damping_ratio"):

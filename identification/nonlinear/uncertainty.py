@@ -64,11 +64,7 @@ class ErrorModel:
 
 
 def propagated(
-    states: States,
-    backbone: Backbone,
-    rows: tuple[int, ...],
-    shapes: ModeShapes | None,
-    model: ErrorModel,
+    states: States, backbone: Backbone, rows: tuple[int, ...], shapes: ModeShapes | None, model: ErrorModel
 ) -> dict[str, Float]:
     """Return standard errors, their systematic and random parts, and intervals, by field name of `NonlinearMode`.
 

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
-from identification.response_control import LevelFit
+from identification.common import LevelFit
 from rig.drawing.page import grid
 from rig.drawing.steady_curve import UNSTABLE, draw_stability
 from rig.drawing.style import COLOURS, REJECTED, Axes, Figure, legend_above, length_factor, plain_log, shade, title

@@ -4,7 +4,7 @@ What reads a recording raises `rig.errors.RecordingError` for one of another kin
 nothing in it was accepted.
 """
 
-from identification.multisine import Estimator
+from identification.common import Estimator
 from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows
 from rig.measurements.measurements import (
     STEPPED,

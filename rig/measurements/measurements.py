@@ -14,7 +14,7 @@ from identification import (
     Transient,
     force_surface as surface_of,
 )
-from identification.multisine import Estimator
+from identification.common import Estimator
 from rig.campaigns.dwell.points import DwellCourse
 from rig.campaigns.kinds import KINDS, kinds_that_yield
 from rig.errors import RecordingError

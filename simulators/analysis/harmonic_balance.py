@@ -159,10 +159,7 @@ def constant_displacement_response(
 
 
 def forced_response(
-    rig: VirtualRig,
-    voltage_v: float,
-    frequencies_hz: ArrayLike,
-    **options: Unpack[BalanceOptions],
+    rig: VirtualRig, voltage_v: float, frequencies_hz: ArrayLike, **options: Unpack[BalanceOptions]
 ) -> PeriodicResponses:
     """Compute the response to a constant voltage at each frequency, as in a slow sweep without control in this order.
 

@@ -21,11 +21,7 @@ if TYPE_CHECKING:
         Magnet as Magnet,
         User as User,
     )
-    from simulators.sites.friction import (
-        FrictionSite as FrictionSite,
-        IwanSite as IwanSite,
-        JenkinsSite as JenkinsSite,
-    )
+    from simulators.sites.friction import FrictionSite as FrictionSite, IwanSite as IwanSite, JenkinsSite as JenkinsSite
     from simulators.structures.meshed import LumpedMass as LumpedMass, MeshedBeam as MeshedBeam, Support as Support
     from simulators.structures.structure import (
         BeamStructure as BeamStructure,

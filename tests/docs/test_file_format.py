@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 
 from identification import FrequencyResponseMatrix, LinearModes, NonlinearMode
-from identification.nonlinear import STANDARD_ERRORS
+from identification.common import STANDARD_ERRORS
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from

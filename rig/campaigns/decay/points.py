@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification import Backbone, DecayBackbone, IdentificationError
-from identification.decays import decay_with_force
+from identification.common import decay_with_force
 from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.campaign import Campaign

@@ -13,7 +13,7 @@ from identification import (
     best_linear_approximation,
     periodic_spectra,
 )
-from identification.multisine import Estimator
+from identification.common import Estimator
 from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.campaign import Campaign

@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from identification.linear import Weighting
+from identification.common import Weighting
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
 from rig.results.options import BandHz, Near, Option, Options
