@@ -47,6 +47,9 @@ def decay_backbone(
 ) -> DecayBackbone:
     """Identify modal frequency and damping over the amplitude from a free decay.
 
+    Returns one mode for each frequency. All channels of the kind of motion of the reference (the drive point, or the
+    channel with the least noise) contribute to the rates, weighted by their noise.
+
     Raises `IdentificationError` if values are NaN or infinite, shapes differ, there is no motion, a named mode is not
     found or cannot be told from a neighbour or from a harmonic of another mode, or the decay is too short.
 
@@ -75,12 +78,6 @@ def decay_backbone(
         Receptance of all other modes at the drive point, m/N, where a force is taken out; see `identification.slow_flow`.
     specimen
         Name of what was tested.
-
-    Returns
-    -------
-    DecayBackbone
-        One mode for each frequency. All channels of the kind of motion of the reference (the drive point, or the channel
-        with the least noise) contribute to the rates, weighted by their noise.
     """
     channels = tuple(channels)
     data = finite_array("samples", samples, np.float64, 2)

@@ -88,6 +88,8 @@ class FrequencyResponseMapping(MeasurementMapping):
 def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tuple[FrequencyResponse, ...]:
     """Return the frequency responses in ``data``, in the order of the mapping.
 
+    The result is in SI units and peak values; the phase of the force is zero unless complex forces are stored.
+
     Raises `IdentificationError` if a path does not exist, or a shape or number does not fit; the message names set,
     level and path.
 
@@ -97,11 +99,6 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
         Nested dictionaries, lists and arrays.
     mapping
         Where the values are in ``data`` and what they mean.
-
-    Returns
-    -------
-    tuple of FrequencyResponse
-        In SI units and peak values; the phase of the force is zero unless complex forces are stored.
     """
     found: list[FrequencyResponse] = []
     for number, group in enumerate(mapping.sets):

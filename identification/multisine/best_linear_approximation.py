@@ -70,6 +70,8 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     with several. Both noise and distortion reduce it below 1. Few records bias it upwards: n records of pure noise give
     ``n_inputs / n`` on average.
 
+    Returns the coherence at the excited lines, float[n_excited], in [0, 1].
+
     Raises `IdentificationError` if channels are missing, there are not more records than inputs, lines have no power,
     or inputs are linearly dependent.
 
@@ -81,11 +83,6 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
         Name of a channel.
     inputs
         Name or names of channels; None for all forces.
-
-    Returns
-    -------
-    float[n_excited]
-        Coherence at the excited lines, in [0, 1].
     """
     rows = chosen("inputs", spectra.channels, inputs, ("force",))
     lines = spectra.spectra[..., spectra.excited].reshape(-1, len(spectra.channels), int(spectra.excited.sum()))

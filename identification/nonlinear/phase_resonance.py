@@ -63,6 +63,14 @@ def nonlinear_mode(
 ) -> NonlinearMode:
     """Identify a nonlinear mode from a measured backbone, every quantity with its standard error.
 
+    The result is in the order of the backbone. Without any mass-normalised shape, damping and modal amplitude are NaN,
+    the modal frequency is that of the vibration, and a note says so. Standard errors include the errors of the Fourier
+    coefficients, of the drift, of the shapes (if known) and of the sensors (as given here). They do not include
+    aliasing of the output's steps in inputs without an anti-aliasing filter. Nor do they include the run-to-run
+    scatter of the specimen and of the reached level, which `identification.combined` estimates. At one voltage the
+    amplitudes of the friction beam differ by up to 5e-5 from run to run, several times their standard error;
+    frequency, damping and apparent mass at the reached amplitude do not.
+
     Raises `IdentificationError` if points are unsettled, a force or motion is zero or not above its noise, a modal
     frequency is not real, the damping is negative at most points (reversed polarity), or modes or channels do not
     match.
@@ -86,17 +94,6 @@ def nonlinear_mode(
     draws, seed
         Number of draws and seed of the Monte Carlo error propagation; the same seed gives the same numbers. With 0 draws no
         errors are propagated: all standard errors and intervals are NaN.
-
-    Returns
-    -------
-    NonlinearMode
-        In the order of the backbone. Without any mass-normalised shape, damping and modal amplitude are NaN, the modal
-        frequency is that of the vibration, and a note says so. Standard errors include the errors of the Fourier
-        coefficients, of the drift, of the shapes (if known) and of the sensors (as given here). They do not include aliasing
-        of the output's steps in inputs without an anti-aliasing filter. Nor do they include the run-to-run scatter of the
-        specimen and of the reached level, which `identification.combined` estimates. At one voltage the amplitudes of the
-        friction beam differ by up to 5e-5 from run to run, several times their standard error; frequency, damping and
-        apparent mass at the reached amplitude do not.
     """
     notes: tuple[str, ...] = ()
     if modes is not None:

@@ -37,6 +37,10 @@ def single_point_mode(
 ) -> NonlinearMode:
     """Identify a nonlinear mode from points near resonance, each point independently.
 
+    Returns one entry per point, smallest amplitude first; ``frequency_hz`` and ``phase_lag_deg`` show its distance
+    from resonance. Standard errors are NaN, because fundamentals alone do not provide them. Harmonics, total power,
+    purity and MAC are NaN.
+
     Raises `IdentificationError` if no point is in the window, the mode shape is zero, or the window is out of its
     range.
 
@@ -51,13 +55,6 @@ def single_point_mode(
     modes, mode
         Linear modal analysis, and the index of the tested mode in it (if None, the mode nearest to the points). The other
         modes and the residual terms are subtracted from the response (``R F`` above). Without ``modes``, R is zero.
-
-    Returns
-    -------
-    NonlinearMode
-        One entry per point, smallest amplitude first; ``frequency_hz`` and ``phase_lag_deg`` show its distance from
-        resonance. Standard errors are NaN, because fundamentals alone do not provide them. Harmonics, total power, purity and
-        MAC are NaN.
     """
     if not 0.0 < phase_window_deg <= 80.0:
         raise IdentificationError(field="phase_window_deg", value=phase_window_deg, allowed="above 0 to 80")

@@ -55,6 +55,14 @@ def stepped_sine_mode(
 ) -> NonlinearMode:
     """Identify a nonlinear mode from the response-controlled levels of a stepped-sine test.
 
+    Returns one entry per level, in the given order; ``amplitude_m`` is the displacement of the measured response at
+    its level, ``frequency_hz`` the modal frequency, ``phase_lag_deg`` is ``90 + beta``, ``force_n`` the fitted force
+    at the modal frequency. ``modal_amplitude`` is NaN without a mass-normalised shape; the amplitudes of the measured
+    point and ``apparent_mass_kg`` suffice to predict responses there. Power, purity and MAC are NaN, because
+    fundamentals alone do not determine them. Standard errors treat the residual of the fit as noise and are enlarged
+    for few points: 1.96 standard errors are half of Student's 95 % interval. They are not valid if the residual is a
+    model error. Levels to which no mode can be fitted are left out and named in the notes.
+
     Raises `IdentificationError` if there are no response-controlled levels, or if every level has fewer than three
     usable points or no resonance.
 
@@ -68,17 +76,6 @@ def stepped_sine_mode(
         away. At least three points are needed.
     complex_constant
         Whether the modal constant may be complex; False holds its phase beta at zero.
-
-    Returns
-    -------
-    NonlinearMode
-        One entry per level, in the given order; ``amplitude_m`` is the displacement of the measured response at its level,
-        ``frequency_hz`` the modal frequency, ``phase_lag_deg`` is ``90 + beta``, ``force_n`` the fitted force at the modal
-        frequency. ``modal_amplitude`` is NaN without a mass-normalised shape; the amplitudes of the measured point and
-        ``apparent_mass_kg`` suffice to predict responses there. Power, purity and MAC are NaN, because fundamentals alone do
-        not determine them. Standard errors treat the residual of the fit as noise and are enlarged for few points: 1.96
-        standard errors are half of Student's 95 % interval. They are not valid if the residual is a model error. Levels to
-        which no mode can be fitted are left out and named in the notes.
     """
     if not 0.0 < phase_window_deg <= 90.0:
         raise IdentificationError(field="phase_window_deg", value=phase_window_deg, allowed="above 0 to 90")

@@ -48,6 +48,9 @@ def fit_with_scatter(
     What a model gets wrong in the same way in all runs stays in the shared parameters. What it gets wrong differently, at
     different levels say, counts as scatter. Shifts of different effects are taken for independent of each other.
 
+    Returns the fit of the shared parameters; its model is that of a run in the middle of the distribution. Its covariance
+    does not hold the scatter: the standard error of a shared frequency is at least the ``mean_std`` of its width.
+
     Raises `IdentificationError` if there are fewer than two runs, names do not match the experiments, or the model has
     no mode in the excited band.
 
@@ -67,12 +70,6 @@ def fit_with_scatter(
         Largest number of fits.
     progress
         Called with a line after each round.
-
-    Returns
-    -------
-    fit, scatter
-        Fit of the shared parameters; its model is that of a run in the middle of the distribution. Its covariance does not
-        hold the scatter: the standard error of a shared frequency is at least the ``mean_std`` of its width.
     """
     everything = [*training, *validation]
     same_channels(everything)

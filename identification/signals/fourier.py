@@ -57,6 +57,12 @@ def periodic_vibration(
 ) -> PeriodicVibration:
     """Compute the periodic vibration in a settled record.
 
+    Returns the vibration over the whole periods from the start of the record. ``harmonics_std`` is the scatter of the
+    residual's coefficients over up to 20 batches of whole periods, which fully includes coloured noise and slow
+    variations. Below four periods it takes the residual as white noise. With ``resolution`` it includes
+    ``rounding_std``, the rounding error that repeats in every period (`identification.signals.rounding`). It does not
+    include calibration errors or run-to-run scatter.
+
     Raises `IdentificationError` if values are NaN or infinite, lengths differ, there is less than one period, the
     phase falls, there are too few samples per period for H, or more than 5 % of the samples are lost.
 
@@ -82,15 +88,6 @@ def periodic_vibration(
         lost.
     phase_lag_target_deg, settled
         Passed to the result.
-
-    Returns
-    -------
-    PeriodicVibration
-        The vibration over the whole periods from the start of the record. ``harmonics_std`` is the scatter of the residual's
-        coefficients over up to 20 batches of whole periods, which fully includes coloured noise and slow variations. Below
-        four periods it takes the residual as white noise. With ``resolution`` it includes ``rounding_std``, the rounding error
-        that repeats in every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run
-        scatter.
     """
     theta = finite_array("theta_rad", theta_rad, np.float64, 1)
     gone = _lost(lost, theta.size)

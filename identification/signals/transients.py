@@ -96,6 +96,8 @@ def demodulate(
 ) -> Transient:
     """Compute the fundamentals over time of a record with known phase of the oscillator.
 
+    Returns the fundamentals without the first P and the last P periods, where the window would be incomplete.
+
     Raises `IdentificationError` if values are NaN or infinite, lengths differ, the phase falls, there are fewer than 8
     samples per period, or the record is too short.
 
@@ -108,11 +110,6 @@ def demodulate(
         but raise a narrow minimum that is passed fast.
     every
         Spacing of the result in samples; about sixteen values per shortest period if None.
-
-    Returns
-    -------
-    Transient
-        Fundamentals without the first P and the last P periods, where the window would be incomplete.
     """
     theta = unwrapped(finite_array("theta_rad", theta_rad, np.float64, 1))
     single = np.asarray(samples).dtype == np.float32  # as recorded; stretches are computed in double precision

@@ -51,6 +51,8 @@ class ShortPoint:
 def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float | None = None) -> ShortPoint:
     """Identify modal properties at the amplitude that the vibration had from ``start_s`` to ``stop_s``.
 
+    Returns the point at the mean amplitude of this part.
+
     Raises `IdentificationError` if there are fewer than two periods, the amplitude changes by more than half, or the
     stiffness is not positive.
 
@@ -62,11 +64,6 @@ def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float |
     start_s, stop_s
         Begin and end of the point, seconds from the first sample; the whole flow if None. Every instant also includes one and
         a half periods before and after it.
-
-    Returns
-    -------
-    ShortPoint
-        The point at the mean amplitude of this part.
     """
     part = flow.between(flow.time_s[0] if start_s is None else start_s, flow.time_s[-1] if stop_s is None else stop_s)
     periods = float(part.phase_periods[-1] - part.phase_periods[0])

@@ -180,6 +180,8 @@ def slow_flow(
 ) -> SlowFlow:
     """Identify modal properties at every instant of a record.
 
+    Returns the slow flow without the first and last one and a half periods, where the window would be incomplete.
+
     Raises `IdentificationError` if values are NaN or infinite, lengths differ, the phase falls, there are too few
     samples per period, the record is too short, or roles are missing.
 
@@ -203,11 +205,6 @@ def slow_flow(
         part of `LinearModes.receptance` without the tested mode). It has no effect on a settled vibration near phase
         resonance. A ramp faster than the free decay needs a multiple of the settled force, and without this receptance the
         damping is then off by a percent.
-
-    Returns
-    -------
-    SlowFlow
-        The slow flow without the first and last one and a half periods, where the window would be incomplete.
     """
     theta = unwrapped(finite_array("theta_rad", theta_rad, np.float64, 1))
     data = finite_array("samples", samples, np.float64, 2)
