@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import NonlinearMode
 from identification.common import decode, encode
-from identification.nonlinear import QUANTITIES
+from identification.common import QUANTITIES
 from rig.drawing.curves import Curves, View, backbone_curves
 from rig.results.kind import Exchange, Table
 from rig.text.column import Column
