@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import NonlinearMode
-from identification.common import decode, encode
-from identification.common import QUANTITIES
+from identification.common import QUANTITIES, decode, encode
 from rig.drawing.curves import Curves, View, backbone_curves
 from rig.results.kind import Exchange, Table
 from rig.text.column import Column
