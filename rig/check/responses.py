@@ -117,9 +117,8 @@ def _pole(s: Complex, values: Complex) -> tuple[float, float] | None:
     weight = np.ones(s.size)
     stiffness, damping = 1.0, 0.01
     for _ in range(ITERATIONS):
-        rows = [_reduced(powers * weight[:, None], value * weight, s) for value in values]
-        matrix = np.concatenate([row[0] for row in rows])
-        right = np.concatenate([row[1] for row in rows])
+        rows = np.concatenate([_reduced(powers * weight[:, None], value * weight, s) for value in values])
+        matrix, right = rows[:, :2], rows[:, 2]
         (stiffness, damping), *_ = np.linalg.lstsq(
             np.concatenate([matrix.real, matrix.imag]), np.concatenate([right.real, right.imag]), rcond=None
         )
@@ -130,12 +129,14 @@ def _pole(s: Complex, values: Complex) -> tuple[float, float] | None:
     return (float(stiffness), float(damping)) if inside else None
 
 
-def _reduced(numerator: Complex, value: Complex, s: Complex) -> tuple[Complex, Complex]:
-    """Set up ``value (s^2 + a s + b) = numerator coefficients`` and project out the unknowns of the numerator."""
+def _reduced(numerator: Complex, value: Complex, s: Complex) -> Complex:
+    """Set up ``value (s^2 + a s + b) = numerator coefficients`` and project out the unknowns of the numerator.
+
+    The last column is the right side.
+    """
     basis, _ = np.linalg.qr(numerator)
     columns = np.column_stack([value, value * s, -value * s**2])
-    left = columns - basis @ (basis.conj().T @ columns)
-    return left[:, :2], left[:, 2]
+    return np.asarray(columns - basis @ (basis.conj().T @ columns))
 
 
 BANDWIDTHS = 8.0

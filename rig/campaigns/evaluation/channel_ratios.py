@@ -15,14 +15,12 @@ DETUNED = 20.0  # growth of the allowance per relative deviation of the squared 
 
 def ratios_of(point: Point[object], drive: int) -> np.ndarray:
     """Fundamentals over the fundamental of channel ``drive``: complex[n_channels], in the ratio of the channels' units."""
-    fundamentals = spectrum_of(point).harmonics[:, 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(fundamentals / fundamentals[drive])
+    return over_drive(spectrum_of(point).harmonics[:, 1], drive)
 
 
-def rms_ratios_of(channel_rms: Sequence[float], drive: int) -> np.ndarray:
-    """RMS values over the RMS of channel ``drive``: float64[n_channels], in the ratio of the channels' units."""
-    sizes = np.asarray(channel_rms, float)
+def over_drive(values: Sequence[float] | np.ndarray, drive: int) -> np.ndarray:
+    """Values of all channels, such as their RMS, over that of channel ``drive``: [n_channels], in the ratio of their units."""
+    sizes = np.asarray(values)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(sizes / sizes[drive])
 

@@ -1,6 +1,6 @@
 """Frequency responses from the points of a recording, for every kind of campaign that steps through frequencies or lags."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -49,21 +49,19 @@ def recorded_frequency_responses(recording: Recording) -> tuple[FrequencyRespons
 def passes_of(points: Iterable[Point[object]]) -> list[tuple[str, list[Point[object]]]]:
     """Return the name and the accepted points of each level and pass, in the order of measurement.
 
-    Raises `IdentificationError` if no point was accepted.
+    The name is the level, with direction and repeat where passes at the same level differ in them. Raises
+    `IdentificationError` if no point was accepted.
     """
     passes: dict[tuple[float, str, int, str], list[Point[object]]] = {}
     for point in without_repetition(points):
         if point.accepted:
             passes.setdefault((point.level, point.direction, point.repeat, point.level_unit), []).append(point)
     IdentificationError.raise_if(not passes, "none of the recording was accepted", field="points")
-    return [
-        (_label(level, unit, direction, repeat, [one for one in passes if one[0] == level]), accepted)
-        for (level, direction, repeat, unit), accepted in passes.items()
-    ]
-
-
-def _label(level: float, unit: str, direction: str, repeat: int, alike: Sequence[tuple[float, str, int, str]]) -> str:
-    """Return the level as text, with direction and repeat where other passes at the same level differ in them."""
-    size = f"{1e3 * level:.4g} mm" if unit == "m" else f"{level:g} {unit}"
-    size += f" {direction}" if len({other[1] for other in alike}) > 1 else ""
-    return size + (f" {repeat}" if len({other[2] for other in alike}) > 1 else "")
+    out = []
+    for (level, direction, repeat, unit), accepted in passes.items():
+        alike = [one for one in passes if one[0] == level]
+        label = f"{1e3 * level:.4g} mm" if unit == "m" else f"{level:g} {unit}"
+        label += f" {direction}" if len({one[1] for one in alike}) > 1 else ""
+        label += f" {repeat}" if len({one[2] for one in alike}) > 1 else ""
+        out.append((label, accepted))
+    return out

@@ -37,10 +37,10 @@ from rig.campaigns.evaluation.channel_misfit import (
 from rig.campaigns.evaluation.channel_ratios import (
     allowance_growth,
     motions_of,
+    over_drive,
     ratio_std,
     ratios_of,
     resistance_of,
-    rms_ratios_of,
     shapes_of,
 )
 from rig.campaigns.evaluation.lost_samples import rms_of
@@ -73,7 +73,7 @@ def with_plausible_ways(bench: Bench, point: Point[object], pieces: Sequence[np.
     if len(pieces) < 2:
         return point
     drive = bench.index_of("drive")
-    up, down = (rms_ratios_of(rms_of(rows), drive) for rows in pieces)
+    up, down = (over_drive(rms_of(rows), drive) for rows in pieces)
     responses = [index for index, channel in enumerate(bench.channels) if channel.role == "response"]
     allowed = ALLOWANCE * float(np.max(up[motions_of(bench)]))
     misfits = [
@@ -194,8 +194,8 @@ def _of_a_band(bench: Bench, point: Point[object], before: Sequence[Point[object
     if point.channel_rms is None or not alike:
         return []
     drive = bench.index_of("drive")
-    here = rms_ratios_of(point.channel_rms, drive)
-    usual = np.median([rms_ratios_of(sizes, drive) for sizes in alike], axis=0)
+    here = over_drive(point.channel_rms, drive)
+    usual = np.median([over_drive(sizes, drive) for sizes in alike], axis=0)
     return [
         _misfit(channel.name, complex(here[index]), complex(usual[index]), 1e-12, Reference.BEFORE)
         for index, channel in enumerate(bench.channels)

@@ -1,6 +1,5 @@
 """The response-controlled campaign: hold the drive point's displacement while the phase lag steps through resonance."""
 
-from collections.abc import Sequence
 from itertools import product
 from typing import Literal, Self
 
@@ -89,8 +88,9 @@ class ResponseControlledPlan(SettledPlan):
         out = self.start_segments() if left else []
         at: Target | None = None
         for target in left:
-            before = self._approach(targets, target)
-            if before is not None and before != at:
+            before = targets[target.number - 1] if target.number else None
+            on_the_way = before is not None and (before.level, before.repeat) == (target.level, target.repeat)
+            if before is not None and on_the_way and before != at:
                 out.append(self._ramp(at, before, -1))
                 out.append(self._segment(SegmentKind.HOLD, before, -1, float(self.settle.shortest_periods)))
                 at = before
@@ -127,10 +127,3 @@ class ResponseControlledPlan(SettledPlan):
             lag_deg=target.phase_lag_deg,
             geometric=True,
         )
-
-    @staticmethod
-    def _approach(targets: Sequence[Target], target: Target) -> Target | None:
-        """Return the point from which a point is approached: the previous one if it has the same level and repeat."""
-        before = targets[target.number - 1] if target.number else None
-        same_way = before is not None and (before.level, before.repeat) == (target.level, target.repeat)
-        return before if same_way else None

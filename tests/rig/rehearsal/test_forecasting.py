@@ -1,4 +1,4 @@
-"""A run is compare with what was foreseen, and a bench may ask for that before it is armed."""
+"""A run is compared with what was foreseen, and a bench may ask for that before it is armed."""
 
 from dataclasses import replace
 
