@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from identification import Experiment, decimated
+from identification.experiments import InitialState
 from identification.signals import EDGE_SAMPLES
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
@@ -67,7 +68,8 @@ def sweep_pieces(
         rest = bool(np.all(first <= AT_REST * np.abs(used).max(axis=1)))
         slow = _slower(signals, signals.without_high_pass(values), rate_hz, begins_at_rest=rest)
         called = name if len(pieces) == 1 else f"{name}, piece {number}"
-        state, ahead = "zero" if rest else "estimated", round(max(0, before - piece.start) * rate_hz / fs)
+        state: InitialState = "zero" if rest else "estimated"
+        ahead = round(max(0, before - piece.start) * rate_hz / fs)
         yield signals.experiment(slow, rate_hz, initial_state=state, name=called, level=level, counted_from=ahead)
 
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict, Unpack
 
 import numpy as np
 import scipy
 
 from identification import Channel, Experiment
 from identification.common import chosen_rows
+from identification.experiments import InitialState
 from rig.bench import Bench
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 
@@ -18,6 +19,18 @@ _KAISER_BETA = 8.6  # of the window: side lobes 90 dB down
 _RESTORED = 10.0
 """Multiple of a sensor's corner from which on its high-pass is removed from records that are not periodic."""
 _HELD_AT_ZERO = ("velocity", "acceleration")
+
+
+class _Facts(TypedDict, total=False):
+    """Fields of an experiment other than its signals."""
+
+    name: str
+    level: float
+    initial_state: InitialState
+    counted_from: int
+    period_samples: int
+    excited_hz: tuple[float, float]
+    output_noise: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -46,7 +59,7 @@ class Signals:
         """All channels, including the output ``voltage``."""
         return (*channels_of(self.bench), VOLTAGE)
 
-    def experiment(self, values: np.ndarray, rate_hz: float, **facts: Any) -> Experiment:
+    def experiment(self, values: np.ndarray, rate_hz: float, **facts: Unpack[_Facts]) -> Experiment:
         """Return an experiment with ``values``, float[n_channels + 1, n] at a rate in Hz; ``facts``: its other fields."""
         return Experiment(
             inputs=values[list(self.inputs)],
