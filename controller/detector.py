@@ -153,11 +153,14 @@ def force_rms(parameters: Record, state: Record) -> float:
 
 
 @inner_kernel
-def phase_error(parameters: Record, state: Record, vibration: Record, wanted_lag: float, lag_of_skew: float) -> float:
-    """Return wanted minus measured phase lag (rad), corrected for ``lag_of_skew``.
+def phase_error(
+    parameters: Record, state: Record, vibration: Record, wanted_lag: float, lag_of_channels: float
+) -> float:
+    """Return wanted minus measured phase lag (rad), corrected for ``lag_of_channels``.
 
-    ``lag_of_skew`` is the phase (rad) by which the force channel is sampled later than the acceleration channel.
+    ``lag_of_channels`` is the phase (rad) by which the force channel lags the acceleration channel: it is sampled later, or
+    has a lower high-pass.
     """
     if parameters.kind == SIGN:
-        return float(0.5 * math.pi * state.sign_mean - lag_of_skew)
-    return wrap(wanted_lag - phase_lag(vibration.force, vibration.drive) - lag_of_skew)
+        return float(0.5 * math.pi * state.sign_mean - lag_of_channels)
+    return wrap(wanted_lag - phase_lag(vibration.force, vibration.drive) - lag_of_channels)

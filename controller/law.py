@@ -127,10 +127,10 @@ class OpenLoop(HarmonicsTable, DetectorSettings, AmplitudeSettings):
 
 
 @inner_kernel
-def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_skew: float, by_loop: bool) -> bool:
+def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_channels: float, by_loop: bool) -> bool:
     """Update presence, phase error and steady force in ``control.vibration``; called after the detector, once a sample.
 
-    ``wanted_lag`` and ``lag_of_skew`` are in rad; the latter is the phase by which the force channel is sampled later.
+    ``wanted_lag`` and ``lag_of_channels`` are in rad; the latter is the phase by which the force channel lags the other.
     ``by_loop``: the frequency law gives the frequency. Return whether the loop is closed: the frequency law gives the
     frequency, and force and motion are present.
     """
@@ -140,9 +140,9 @@ def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_skew: 
     vibration.present = 1 if present else 0
     vibration.error_rad = 0.0
     if closed:
-        vibration.error_rad = phase_error(law.detector, control.detector, vibration, wanted_lag, lag_of_skew)
+        vibration.error_rad = phase_error(law.detector, control.detector, vibration, wanted_lag, lag_of_channels)
     if by_loop:
-        estimate_steady_force(law.rest, control.rest, vibration, control.frequency.omega, wanted_lag, lag_of_skew)
+        estimate_steady_force(law.rest, control.rest, vibration, control.frequency.omega, wanted_lag, lag_of_channels)
     else:
         take_as_measured(control.rest, vibration)
     return closed

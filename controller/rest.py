@@ -57,7 +57,7 @@ def take_as_measured(state: Record, vibration: Record) -> None:
 
 @inner_kernel
 def estimate_steady_force(
-    parameters: Record, state: Record, vibration: Record, omega: float, wanted_lag: float, lag_of_skew: float
+    parameters: Record, state: Record, vibration: Record, omega: float, wanted_lag: float, lag_of_channels: float
 ) -> None:
     """Update the estimate with one sample, for the oscillator's frequency ``omega`` (rad/s) and ``wanted_lag`` (rad).
 
@@ -70,8 +70,8 @@ def estimate_steady_force(
         take_as_measured(state, vibration)
         return
     drive = vibration.drive
-    if lag_of_skew != 0.0:
-        drive *= complex(math.cos(lag_of_skew), math.sin(lag_of_skew))
+    if lag_of_channels != 0.0:
+        drive *= complex(math.cos(lag_of_channels), math.sin(lag_of_channels))
     state.late_force += parameters.gain * (vibration.force - state.late_force)
     step = parameters.gain * (drive - state.late_drive)
     state.late_drive += step

@@ -41,8 +41,7 @@ def new_file(
     """
     name = {"plan": kind, "sensors": "sensors"}.get(what, "bench")
     named = {} if what == "sensors" else {"name": output.stem}
-    starts = Path(str(resources.files("rig.authoring"))) / "starts"
-    begun = _plan(kind, bench) if what == "plan" else {**(table or read_toml(starts / f"{what}.toml")), **named}
+    begun = _plan(kind, bench) if what == "plan" else {**(table or start(what)), **named}
     schema = schema_of(name)
     beside = schema_file or output.with_name(f"{name}.schema.json")
     text = f"#:schema {_reference(beside, output)}\n{commented(begun, schema)}"
@@ -86,6 +85,11 @@ def _exists(path: Path) -> RecordingError:
 def _reference(schema: Path, file: Path) -> str:
     relative = Path(os.path.relpath(schema.resolve(), file.resolve().parent)).as_posix()
     return relative if relative.startswith(".") else f"./{relative}"
+
+
+def start(name: str) -> Table:
+    """Return what a new file begins with: ``bench``, ``rig`` or ``sensors``."""
+    return read_toml(Path(str(resources.files("rig.authoring"))) / "starts" / f"{name}.toml")
 
 
 def _plan(kind: str, bench: str | None) -> Table:

@@ -110,13 +110,14 @@ def _unless(key: str, rules: Schema) -> Schema:
 def _options_of_drivers() -> dict[str, Schema]:
     from rig.drivers.can import CanOptions
     from rig.drivers.serial import SerialOptions
+    from rig.drivers.sound.options import SoundOptions
     from rig.drivers.virtual.driver import Queue
 
     rig, queue = _of_rig(), draft7(Queue.model_json_schema())
     del rig["properties"]["seed"]  # is given to the run
     rig["properties"] |= queue["properties"]
     rig["definitions"] |= queue["definitions"]
-    return {"virtual": rig, "serial": _of(SerialOptions), "can": _of(CanOptions)}
+    return {"virtual": rig, "serial": _of(SerialOptions), "can": _of(CanOptions), "sound": _of(SoundOptions)}
 
 
 def _of(model: type[BaseModel]) -> Schema:

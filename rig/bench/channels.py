@@ -91,8 +91,8 @@ class Channel(Configured):
     """Delay of this channel behind the others, samples; taken out of the measured phase lag and of every amplitude."""
     high_pass_hz: float = Field(0.0, ge=0, le=100)
     """Corner of the first-order high-pass of sensor and conditioner, Hz: 0.16 divided by the discharge time constant in
-    seconds. Its gain and phase are taken out of the harmonics of every steady vibration, out of multisines and out of
-    sweeps, not out of the samples of settled points that a model is fitted to; 0 for none."""
+    seconds. Its phase is taken out of the loop's, its gain and phase out of the harmonics of every steady vibration, out of
+    multisines and out of sweeps; not out of the samples of settled points that a model is fitted to. 0 for none."""
     sensor: str = ""
     """Make and model, for the record."""
     serial_number: str = ""

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from rig.cli.analyse import app as analyse_app
+from rig.cli.calibrate import calibrate_
 from rig.cli.check import check_
 from rig.cli.compiling import say_what_is_compiled
 from rig.cli.conformance import conformance
@@ -57,7 +58,7 @@ def _common(
 
 app.add_typer(identify_app, name="identify")
 app.add_typer(predict_app, name="predict")
-for _command in (list_, new, schema, import_, export_, tune_, emulate, conformance, check_, rehearse_):
+for _command in (list_, new, schema, import_, export_, tune_, emulate, conformance, check_, calibrate_, rehearse_):
     app.command(_command.__name__.rstrip("_"))(_command)
 app.command("reproduce", cls=StudyCommand, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})(
     reproduce_

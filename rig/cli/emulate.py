@@ -1,4 +1,4 @@
-"""``rig emulate``: a virtual rig behind the wire protocol of a real device."""
+"""``rig emulate``: a virtual rig behind the wire protocol of a real device, or as a sound card."""
 
 import json as jsonlib
 import math
@@ -21,7 +21,7 @@ SHORTEST_BLOCK_S = 0.002
 
 def emulate(
     context: typer.Context,
-    wire: Annotated[str, typer.Argument(help="serial or can.")],
+    wire: Annotated[str, typer.Argument(help="serial, can or sound.")],
     bench: Annotated[str, typer.Option(help="Virtual bench to put behind it: a name or TOML file.")] = "magnet-beam",
     lockstep: Annotated[bool, typer.Option("--lockstep", help="Wait for the host instead of keeping time.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the rig's noise.", min=0)] = 0,
@@ -45,7 +45,7 @@ def emulate(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Put a virtual rig behind a wire, at the pace of the clock, until Ctrl-C."""
+    """Put a virtual rig behind a wire, or into a sound card, at the pace of the clock, until Ctrl-C."""
     from rig.bench import load_bench
     from rig.bench.configuration import validated
     from rig.emulator.process import run_emulator
@@ -60,10 +60,14 @@ def emulate(
     _check_bench_file(bench_file)
 
     def when_ready(ready: "Ready") -> None:
-        block = _block(behind, ready)
+        if wire == "sound":
+            block, text = _sound_bench(behind, bench, ready)
+        else:
+            block = _block(behind, ready)
+            text = _bench_text(bench, block, ready, as_hardware)
         if bench_file is not None:
             try:
-                bench_file.write_text(_bench_text(bench, block, ready, as_hardware), encoding="utf-8")
+                bench_file.write_text(text, encoding="utf-8")
             except OSError as error:
                 raise ConfigurationError(f"--bench-file {bench_file}: cannot be written: {error.strerror}") from error
         if json:
@@ -79,6 +83,29 @@ def emulate(
     else:
         counts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counted.items())
         print(f"ended: {counts or 'nothing went wrong'}")
+
+
+def _sound_bench(behind: "Bench", name: str, ready: "Ready") -> tuple[int, str]:
+    """Return the block and the text of a bench file that reaches an emulated sound card; it has a channel more."""
+    import tomli_w
+
+    from rig.emulator.sound import reaching_bench
+
+    reaching = reaching_bench(behind, {**ready.options, "queue_blocks": "auto"})
+    table = {
+        "base": _base(name),
+        "sample_rate_hz": reaching.sample_rate_hz,
+        "block": reaching.block,
+        "driver": reaching.driver.model_dump(),
+        "arming": reaching.arming.model_dump(exclude_unset=True),
+        "channels": [channel.model_dump(exclude_unset=True) for channel in reaching.channels],
+    }
+    return reaching.block, f"{WRITTEN}\n{tomli_w.dumps(table)}"
+
+
+def _base(bench: str) -> str:
+    """Return what a bench file begins from: a shipped bench, or a file by its whole path."""
+    return str(Path(bench).absolute()) if bench.endswith(".toml") else bench
 
 
 def _pair(text: str) -> list[str]:
@@ -121,10 +148,9 @@ def _block(bench: "Bench", ready: "Ready") -> int:
 def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> str:
     from rig.emulator.emulated import driver_options
 
-    base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
     options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware) | {"queue_blocks": "auto"}
     lines = "".join(f"{key} = {jsonlib.dumps(value)}\n" for key, value in options.items())
     return (
-        f"{WRITTEN}\nbase = {jsonlib.dumps(base)}\nblock = {block}\n\n"
+        f"{WRITTEN}\nbase = {jsonlib.dumps(_base(bench))}\nblock = {block}\n\n"
         f"[driver]\nname = {jsonlib.dumps(ready.wire)}\n\n[driver.options]\n{lines}"
     )

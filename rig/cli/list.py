@@ -1,4 +1,4 @@
-"""``rig list``: shipped benches, plans, specimens and shakers, and the parts of a virtual rig."""
+"""``rig list``: shipped benches, plans, specimens and shakers, the parts of a virtual rig, and the devices of this computer."""
 
 from importlib import resources
 from json import dumps
@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 def list_(
     part: Annotated[str | None, typer.Argument(help="A part of a virtual rig, whose keys are printed.")] = None,
+    devices: Annotated[
+        bool, typer.Option("--devices", help="Serial ports, CAN interfaces and sound devices of this computer.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
     """Shipped benches, plans, specimens and shakers, installed drivers, and the parts that a virtual rig is built from."""
@@ -21,6 +24,9 @@ def list_(
     from rig.text.console import print_json
     from simulators.parts import shaker_descriptions
 
+    if devices:
+        _print_devices(part, json)
+        return
     if part is not None:
         found = part_keys(part)
         if json:
@@ -38,6 +44,29 @@ def list_(
         print_json({**named, "drivers": driver_names(), "parts": [one._asdict() for one in parts()]})
     else:
         _print_everything(named, driver_names(), parts())
+
+
+def _print_devices(part: str | None, json: bool) -> None:
+    """Print what a bench may name as its device, as lines for the bench."""
+    import tomli_w
+
+    from rig.drivers.devices import attached_devices
+    from rig.errors import ConfigurationError
+    from rig.text.console import print_json
+
+    if part is not None:
+        raise ConfigurationError("allowed is either a part or --devices", where=part)
+    found = attached_devices()
+    if json:
+        print_json({"devices": [one._asdict() for one in found.devices], "missing": found.missing})
+        return
+    for device in found.devices:
+        print(f"# {device.name}" + (f": {device.about}" if device.about else ""))
+        print(tomli_w.dumps({"driver": {"name": device.driver, "options": device.options}}))
+    if not found.devices:
+        print("# no device was found")
+    for reason in found.missing:
+        print(f"# {reason}")
 
 
 def _shipped_in(package: str) -> list[dict[str, str]]:

@@ -51,7 +51,13 @@ def new(
         ),
     ] = None,
     source: Annotated[
-        Path | None, typer.Option("--from", metavar="MODEL", help="Structured model that a rig has as its specimen.")
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="MODEL|DEVICE",
+            help="Structured model that a rig has as its specimen; or device that a bench names, as `rig list --devices` has "
+            "it: sound:NAME, serial:PORT.",
+        ),
     ] = None,
     shaker: Annotated[str, typer.Option(help="With --from: a shaker (`rig list`) in place of that of BENCH.")] = "",
     trust_code: Annotated[
@@ -81,7 +87,10 @@ def new(
         raise ConfigurationError(
             "is for a rig that begins with a model, `source`", field="shaker" if shaker else "trust_code"
         )
-    table = None if source is None else _identified(what, source, bench, shaker, trust_code)
+    if source is not None and what == "bench":
+        _bench_of_device(source, output, schema_file, overwrite)
+        return
+    table = None if source is None else _identified(what, Path(source), bench, shaker, trust_code)
     beside = new_file(
         what, output, kind=plan_kind, bench=bench, schema_file=schema_file, table=table, overwrite=overwrite
     )
@@ -90,6 +99,22 @@ def new(
         return
     one = "file of sensors" if what == "sensors" else what
     print(f"{output}: a {one} to begin with, checked by {beside}")
+
+
+def _bench_of_device(source: str, output: Path, schema_file: Path | None, overwrite: bool) -> None:
+    """Write a bench for a connected device, and a file of sensors beside it if there is none yet."""
+    from rig.authoring.device_bench import bench_of_device, device_named
+    from rig.authoring.new_files import new_file, start
+
+    device = device_named(source)
+    table = bench_of_device(device, start("bench"))
+    beside = new_file("bench", output, schema_file=schema_file, table=table, overwrite=overwrite)
+    sensors = output.with_name("sensors.toml")
+    if not sensors.exists():
+        new_file("sensors", sensors)
+    print(f"{output}: a bench for {device.name}, checked by {beside}; sensors in {sensors}")
+    if device.driver == "sound":
+        print("measure its volts, high-passes and latency next: `rig calibrate`")
 
 
 def _mapping(files: list[Path], output: Path, format_: str, overwrite: bool) -> None:

@@ -30,6 +30,15 @@ def driver_options(options: Table, *, lockstep: bool, as_hardware: bool = False)
     return {**patience, **options}
 
 
+def reaching(bench: Bench, wire: str, options: Table) -> Bench:
+    """Return the bench with which a host reaches the emulator of a virtual bench."""
+    if wire == "sound":
+        from rig.emulator.sound import reaching_bench
+
+        return reaching_bench(bench, options)
+    return bench.model_copy(update={"driver": DriverChoice(name=wire, options=options)})
+
+
 class Emulator:
     """An emulator in a process of its own; a context manager.
 
@@ -70,8 +79,7 @@ class Emulator:
         lockstep, as_hardware = self._settings.lockstep, self._settings.as_hardware
         options = {**message["ready"]["options"], **self._options}
         options = driver_options(options, lockstep=lockstep, as_hardware=as_hardware)
-        driver = DriverChoice(name=self._settings.wire, options=options)
-        self.bench = self._settings.bench.model_copy(update={"driver": driver})
+        self.bench = reaching(self._settings.bench, self._settings.wire, options)
         return self
 
     def press_emergency_stop(self) -> None:
@@ -114,7 +122,7 @@ def emulated(
     options: Table | None = None,
     **settings: object,
 ) -> Iterator[Bench]:
-    """Emulate a virtual bench over ``serial`` or ``can`` while the context lasts; gives a bench that reaches the emulator.
+    """Emulate a virtual bench over ``serial``, ``can`` or ``sound`` while the context lasts; gives a bench that reaches it.
 
     ``options`` are further driver options (``queue_blocks``, ``watchdog_s``...), ``settings`` further `EmulatorSettings`.
     """

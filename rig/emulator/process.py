@@ -81,6 +81,8 @@ def run_emulator(
     parent. SIGUSR1 presses the emergency stop. Raises `ConfigurationError`, `rig.errors.DaqError`.
     """
     should_end = _ending(parent)
+    if settings.wire == "sound":
+        return _run_sound_card(settings, when_ready, should_end)
     names = tuple(channel.name for channel in settings.bench.channels)
     wiring = Wiring(names, settings.flip, settings.dead, settings.swap)
     plant = VirtualPlant(settings.bench, settings.seed, wiring)
@@ -120,6 +122,19 @@ def _run_firmware(
         if not firmware.serve(should_end):
             raise firmware.failure()
         return firmware.end()
+
+
+def _run_sound_card(
+    settings: EmulatorSettings, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
+) -> dict[str, int]:
+    from rig.emulator.sound import run_sound_card
+
+    scheduling = _scheduling(settings)
+
+    def found(options: Table) -> None:
+        when_ready(Ready("sound", options, False, scheduling, LARGEST_BLOCK))
+
+    return run_sound_card(settings, found, should_end)
 
 
 def _scheduling(settings: EmulatorSettings) -> str:

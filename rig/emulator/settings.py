@@ -16,8 +16,8 @@ from vibrolock.errors import InputError
 class EmulatorSettings(Configured):
     """A virtual bench behind a wire, and how it behaves there."""
 
-    wire: Literal["serial", "can"]
-    """The wire protocol it speaks."""
+    wire: Literal["serial", "can", "sound"]
+    """The wire protocol it speaks; ``sound``: a sound card, behind a JACK server."""
     bench: Bench
     """A bench with the virtual driver: the rig behind the wire."""
     seed: int = Field(0, ge=0)
@@ -74,6 +74,10 @@ class EmulatorSettings(Configured):
             raise InputError("a serial device has none", field="interface", value=self.interface)
         if self.interface not in (None, "slcan") and self.channel is None:
             raise InputError(f"is missing, interface {self.interface!r} has several", field="channel")
+        if self.wire == "sound":
+            for field in ("lockstep", "as_hardware", "faults", "link", "log_output", "interface", "firmware"):
+                if getattr(self, field):
+                    raise InputError("a sound card has none", field=field, value=str(getattr(self, field)))
         if self.firmware is not None and self.faults:
             raise InputError(f"{min(self.faults)!r}: a firmware has none", field="faults", allowed="no fault")
         if self.firmware is not None and self.interface not in (None, "slcan"):

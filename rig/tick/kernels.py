@@ -55,6 +55,16 @@ def phase_on_output(history: np.ndarray, seen: int, delay_fraction: float, dt: f
     return float(theta + TWO_PI if theta < 0.0 else theta)
 
 
+@kernel
+def lag_of_channels(loop: Record, omega: float) -> float:
+    """Return the phase (rad) by which the force channel lags behind the drive channel: by its delay, and by the high-passes.
+
+    A first-order high-pass of corner w_c leads by atan(w_c / omega).
+    """
+    leads = math.atan2(loop.drive_high_pass_rad_s, omega) - math.atan2(loop.force_high_pass_rad_s, omega)
+    return float(omega * loop.skew_samples * loop.dt_s + leads)
+
+
 @inner_kernel
 def note_faults(t: TickArrays, flags: int) -> None:
     """Count a sample with a held output, a continued one or a lost one, by the device's ``flags``, in the present segment."""
@@ -277,8 +287,8 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
             measure_harmonics(law.harmonics, control.harmonics, readings[channel], phasor, frequency.omega)
         if t.expected[0].known == 1:
             judge_by_exciter(t, seen)
-    lag_of_skew = frequency.omega * loop.skew_samples * loop.dt_s
-    closed = measure_phase(law, control, progress.lag, lag_of_skew, loop.drive == Drive.LOOP)
+    lag = lag_of_channels(loop, frequency.omega)
+    closed = measure_phase(law, control, progress.lag, lag, loop.drive == Drive.LOOP)
 
     if theta_in < loop.theta_in:
         loop.cycles += 1

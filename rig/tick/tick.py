@@ -96,6 +96,8 @@ class Tick:
         loop["dt_s"] = 1.0 / bench.sample_rate_hz
         loop["force_channel"], loop["drive_channel"] = force, drive
         loop["skew_samples"] = bench.channels[force].skew_samples - bench.channels[drive].skew_samples
+        loop["force_high_pass_rad_s"] = 2.0 * math.pi * bench.channels[force].high_pass_hz
+        loop["drive_high_pass_rad_s"] = 2.0 * math.pi * bench.channels[drive].high_pass_hz
         loop["drive"] = table["drive"][:1]
         control = control_state(law_record)
         first = segments[0].excitation if segments else None

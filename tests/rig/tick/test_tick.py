@@ -70,6 +70,20 @@ def test_skew_between_channels_is_taken_out_of_the_lag():
     assert np.mean(uncompensated["phase_error_rad"][-5000:]) == pytest.approx(expected, rel=0.03)
 
 
+def test_high_passes_of_the_channels_are_taken_out_of_the_lag():
+    """A first-order high-pass leads by atan(corner / frequency): 12 degrees of 5 Hz at 24 Hz."""
+    corners_hz = 5.0, 0.5
+    lead_samples = [-math.atan(corner / 24.0) / (2 * math.pi * 24.0 / 5000) for corner in corners_hz]
+    channels = [channel.model_dump() for channel in bench_with().channels]
+    for channel, corner in zip(channels, corners_hz, strict=False):
+        channel["high_pass_hz"] = corner
+    _, rows = _wired(1, 0.5, bench=bench_with({"channels": channels}), skew=lead_samples)
+    assert np.abs(np.mean(rows["phase_error_rad"][-5000:])) < math.radians(0.2)
+    _, uncompensated = _wired(1, 0.5, skew=lead_samples)
+    expected = math.atan(0.5 / 24.0) - math.atan(5.0 / 24.0)
+    assert np.mean(uncompensated["phase_error_rad"][-5000:]) == pytest.approx(expected, rel=0.03)
+
+
 def test_with_the_mean_of_periods_the_detectors_ripple_leaves_the_frequency_alone():
     proportional = preset("magnet-beam").model_copy(update={"k2": 0.0})
     swings = {}
