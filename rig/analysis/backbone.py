@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from rig.analysis.levels import By, level_range
 from rig.analysis.study import Study, length_unit, set_min_span
 from rig.analysis.subject import Subject
 from rig.drawing.areas import areas, is_narrow
-from rig.drawing.style import COLOURS, MAIN, SECOND
+from rig.drawing.style import COLOURS, MAIN, SECOND, Figure, SubFigure
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import (
@@ -21,9 +20,6 @@ from simulators.analysis import (
     hysteresis_loops,
 )
 from simulators.parts import FrictionSite
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
 
 _MIN_NEGLECTED_PERCENT = 0.001  # smallest neglected part of the force that is given as a number, %; chosen
 _ROUNDING_J = 1e-15  # energy below which a loop is closed by rounding, J; chosen
@@ -85,7 +81,7 @@ class Backbone(Study):
             )
             print(f"lost per period in the joints at {r.force_n[point]:.4g} N, J: {lost}")
 
-    def draw_on(self, page: "Figure") -> None:
+    def draw_on(self, page: Figure) -> None:
         """Draw frequency, damping, amplitude and harmonics over the level, and the loops."""
         found, loops, joints = self.responses, self.loops, self.subject.rig.friction
         upper, *below = areas(page, (4, len(loops) + 1) if loops else (4,), (2.0, 1.15) if loops else (1.0,))
@@ -160,7 +156,7 @@ def neglected_force(found: PeriodicResponses) -> str:
 
 
 def _draw_loops(
-    part: "SubFigure",
+    part: SubFigure,
     found: PeriodicResponses,
     loops: dict[int, tuple[HysteresisLoop, ...]],
     joints: Sequence[FrictionSite],

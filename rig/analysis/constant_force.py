@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,15 +12,11 @@ from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
 from rig.drawing.steady_curve import UNSTABLE
-from rig.drawing.style import REJECTED, SECOND, shade
+from rig.drawing.style import REJECTED, SECOND, Axes, Figure, shade
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import NotConvergedError, PeriodicResponses
 from vibrolock.arrays import Float
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _DEFAULT_LEVELS = (0.1, 0.3, 1.0)
 """Default forces over that which the backbone reaches within the bench's limits; chosen."""
@@ -72,7 +67,7 @@ class ConstantForce(Study):
         headings = ("force N", "resonance Hz", "largest mm", "at Hz", "highest voltage V", "unstable between, Hz")
         print_table(headings, rows)
 
-    def draw_on(self, page: "Figure") -> None:
+    def draw_on(self, page: Figure) -> None:
         """Draw amplitude and phase over frequency."""
         from matplotlib.lines import Line2D
 
@@ -139,7 +134,7 @@ def folds_of(curve: PeriodicResponses) -> list[float]:
     return [float(np.min(unstable)), float(np.max(unstable))]
 
 
-def _branches(axis: "Axes", curve: PeriodicResponses, values: Float, colour: object) -> None:
+def _branches(axis: Axes, curve: PeriodicResponses, values: Float, colour: object) -> None:
     """Draw stable parts solid and unstable parts dotted; the dots extend to the neighbouring stable points."""
     stable = np.ones(values.size, bool) if curve.stable is None else curve.stable
     for kind, style in ((True, "-"), (False, UNSTABLE)):

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,15 +11,11 @@ from rig.analysis.levels import checked_points, highest_resonance
 from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import MAIN, REJECTED, SECOND
+from rig.drawing.style import MAIN, REJECTED, SECOND, Figure
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import NotConvergedError, PeriodicResponses
 from vibrolock.arrays import Float
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 _DEFAULT_LEVEL = 0.5  # default voltage over that at which the bench may be driven in resonance; chosen
 _SPAN = (0.7, 1.3)  # default range over the frequency of the mode under test; chosen
@@ -115,7 +110,7 @@ class Forced(Study):
         else:
             print("up and down agree everywhere")
 
-    def draw_on(self, page: "Figure") -> None:
+    def draw_on(self, page: Figure) -> None:
         """Draw force, response and lag over frequency; the falling direction is drawn only if it differs."""
         down = self.down if self.differ_hz.size or not self.complete else None
         force, response, lag = grid(page, 3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.4))[:, 0]

@@ -1,7 +1,6 @@
 """Linear frequency responses of a bench: voltage to force and accelerations, force to accelerations."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,15 +9,11 @@ from rig.analysis.levels import checked_points
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import COLOURS, MAIN
+from rig.drawing.style import COLOURS, MAIN, Figure
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import FrequencyResponses, frequency_response
 from vibrolock.arrays import Complex
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 _BELOW_LOWEST_MODE, _ABOVE_HIGHEST_MODE = 0.5, 1.2
 """Ends of the default range over the lowest and the highest mode; chosen."""
@@ -82,7 +77,7 @@ class Responses(Study):
             ],
         )
 
-    def draw_on(self, page: "Figure") -> None:
+    def draw_on(self, page: Figure) -> None:
         """Draw magnitudes and phases; each channel has the same colour in all columns."""
         from matplotlib.ticker import MultipleLocator
 

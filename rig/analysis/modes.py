@@ -1,23 +1,18 @@
 """Linear modes of the structure, with their shapes at the channels, and of the coupled rig driven by a voltage."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import COLOURS, MAIN, REJECTED
+from rig.drawing.style import COLOURS, MAIN, REJECTED, Axes, Figure
 from rig.text.console import number, print_table
 from simulators import VirtualRig
 from simulators.analysis import LinearModes
 from simulators.parts import MeshedBeam
 from vibrolock.arrays import Float
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,7 +77,7 @@ class Modes(Study):
             ],
         )
 
-    def draw_on(self, page: "Figure") -> None:
+    def draw_on(self, page: Figure) -> None:
         """Draw a panel for each of the lowest eight modes; along the beam if the structure is a beam."""
         rig, modes = self.subject.rig, self.structure
         count = min(_MAX_MODES, modes.frequency_hz.size)
@@ -132,7 +127,7 @@ _STATIONS = 401  # positions along the beam at which a shape is drawn; chosen
 _MARKERS = "osD^vPX*<>ph"  # markers of what is attached
 
 
-def _along_the_beam(axis: "Axes", rig: VirtualRig, beam: MeshedBeam, modes: LinearModes, k: int) -> None:
+def _along_the_beam(axis: Axes, rig: VirtualRig, beam: MeshedBeam, modes: LinearModes, k: int) -> None:
     x = np.linspace(0.0, beam.length_m, _STATIONS)
     shapes = np.array([beam.modes.shape(float(position)) for position in x])
     axis.plot(x, shapes @ (rig.plant.signs * modes.vectors[:, k]), color=MAIN)

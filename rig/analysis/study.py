@@ -4,21 +4,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.subject import Subject
+from rig.drawing.style import Axes, Figure
 from rig.text.json_values import JsonValue
 from simulators.analysis import PeriodicResponses
 from simulators.kernels import Flag
 from vibrolock.arrays import Float
 from vibrolock.printable import printable
 from vibrolock.results import Result
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def to_json(value: object) -> JsonValue:
@@ -90,7 +86,7 @@ class Study(Result, ABC):
         """Print tables for a person."""
 
     @abstractmethod
-    def draw_on(self, page: "Figure") -> None:
+    def draw_on(self, page: Figure) -> None:
         """Draw on an empty page."""
 
     def summary(self) -> dict[str, JsonValue]:
@@ -140,7 +136,7 @@ def length_unit(largest_m: float) -> tuple[float, str]:
     return (1e6, "µm") if largest_m < 5e-4 else (1e3, "mm")
 
 
-def set_min_span(axis: "Axes", values: Float, smallest: float) -> None:
+def set_min_span(axis: Axes, values: Float, smallest: float) -> None:
     """Let the y axis span at least ``smallest`` times its middle value, so that small changes look small."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     middle, half = 0.5 * (low + high), 0.55 * (high - low)

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,9 @@ from rig.check.findings import Finding
 from rig.check.reference import on_lines_of
 from rig.drawing.areas import is_narrow
 from rig.drawing.page import grid, page_for
-from rig.drawing.style import COLOURS, MAIN, REJECTED, SECOND, title
+from rig.drawing.style import COLOURS, MAIN, REJECTED, SECOND, Axes, Figure, title
 from rig.recording.reader import Recording
 from vibrolock.arrays import Complex, Float
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 VERDICTS = {"fail": SECOND, "warn": "#7a5c00", "not tested": REJECTED}
 """Colours of the verdicts other than ok, the worst first."""
@@ -33,12 +28,12 @@ def write_check(found: Assessment, figure: Path) -> None:
         draw_check(page, found)
 
 
-def draw_recorded_check(page: "Figure", recording: Recording) -> None:
+def draw_recorded_check(page: Figure, recording: Recording) -> None:
     """Assess the recording of a check and draw it on an empty page."""
     draw_check(page, assess(recording))
 
 
-def draw_check(page: "Figure", found: Assessment) -> None:
+def draw_check(page: Figure, found: Assessment) -> None:
     """Draw accelerations per force, phase of the velocity, force per volt (dashed: the reference), and a list of faults.
 
     The velocity of a passive structure's drive point stays within 90 degrees of the force. If the multisine was not played to
@@ -55,7 +50,7 @@ def draw_check(page: "Figure", found: Assessment) -> None:
     _draw_force(axes[0, 1], found)
 
 
-def _draw_ending(page: "Figure", found: Assessment) -> None:
+def _draw_ending(page: Figure, found: Assessment) -> None:
     """Draw the readings of a check that ended early, as shares of their limits, and the list of faults."""
     with Recording(found.recording) as recording:
         part = recording.parts[-1]
@@ -93,7 +88,7 @@ def _largest(found: Assessment, values: Float, index: int) -> float:
     return float(np.nanmax(np.abs(_share(found, values, index))))
 
 
-def _draw_last(axis: "Axes", found: Assessment, rows: NDArray[np.void]) -> None:
+def _draw_last(axis: Axes, found: Assessment, rows: NDArray[np.void]) -> None:
     before_s = (np.arange(rows.size) - rows.size + 1) / found.bench.sample_rate_hz
     for colour, (i, name) in zip(COLOURS, _limited(found), strict=False):
         axis.plot(before_s, _share(found, rows["inputs"][:, i], i), color=colour, lw=0.8, label=name)
@@ -101,7 +96,7 @@ def _draw_last(axis: "Axes", found: Assessment, rows: NDArray[np.void]) -> None:
     axis.legend()
 
 
-def _draw_accelerances(size: "Axes", phase: "Axes", found: Assessment) -> None:
+def _draw_accelerances(size: Axes, phase: Axes, found: Assessment) -> None:
     """Draw accelerations and phase of the velocities per force; per volt if the force channel is dead."""
     if found.responses is None:
         return
@@ -147,7 +142,7 @@ def _per_force(found: Assessment) -> tuple[Complex, dict[str, Float]]:
     return now, {name: lines[i] / lines[old.names.index(force)] for i, name in enumerate(old.names)}
 
 
-def _draw_force(axis: "Axes", found: Assessment) -> None:
+def _draw_force(axis: Axes, found: Assessment) -> None:
     if found.responses is None:
         return
     index = found.bench.index_of("force")
@@ -161,7 +156,7 @@ def _draw_force(axis: "Axes", found: Assessment) -> None:
     axis.set(xlabel="frequency, Hz", ylabel="force, N/V")
 
 
-def _say_findings(axis: "Axes", found: Assessment, rows: int, columns: int) -> None:
+def _say_findings(axis: Axes, found: Assessment, rows: int, columns: int) -> None:
     """List the findings that are not ok, the worst first, with what to do; ``rows`` by ``columns`` panels share the page."""
     from matplotlib import rcParams
     from matplotlib.font_manager import FontProperties

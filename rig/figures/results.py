@@ -2,20 +2,16 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 from identification import FrequencyResponse
-from rig.drawing.style import STYLE, page_in
+from rig.drawing.style import STYLE, Axes, Figure, page_in
 from rig.figures.files import FileOptions, drawing_of
 from rig.recording.reader import Recording
 from rig.results.kinds import kind_of_result
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-
-def plot(thing: Any, *others: Any, page: "Figure | None" = None, **options: Unpack[FileOptions]) -> "tuple[Axes, ...]":
+def plot(thing: Any, *others: Any, page: Figure | None = None, **options: Unpack[FileOptions]) -> tuple[Axes, ...]:
     """Draw a result, a file or a run; return the axes of the figure, from the top left to the bottom right.
 
     Parameters

@@ -1,24 +1,18 @@
 """The figure of a rehearsal: the points of every draw, how it ends, margins, accuracy, and what matters."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, say_why_empty, title
 from rig.rehearsal.rehearsal import Rehearsal
 from rig.rehearsal.verdict import Verdict, verdict_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MAX_LIMITS, MAX_INFLUENCES = 4, 5
 """Limits and influences that are drawn, the closest and strongest; chosen: as many as a panel holds."""
 ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"  # colours of points that are accepted, refused and not begun
 
 
-def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
+def draw_rehearsal(page: Figure, rehearsal: Rehearsal) -> None:
     """Draw six panels on an empty page."""
     verdict = verdict_of(rehearsal)
     axes = grid(page, 2, 3)
@@ -37,7 +31,7 @@ def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
     )
 
 
-def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) -> None:
+def _draw_backbones(frequency: Axes, damping: Axes, rehearsal: Rehearsal) -> None:
     from matplotlib.ticker import LogLocator
 
     for draw in rehearsal.draws:
@@ -66,7 +60,7 @@ def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) ->
     damping.set(xlabel="displacement, mm", ylabel="modal damping, %")
 
 
-def _draw_points(axis: "Axes", verdict: Verdict) -> None:
+def _draw_points(axis: Axes, verdict: Verdict) -> None:
     if not verdict.points:
         say_why_empty(axis, "no point was begun")
         return
@@ -81,7 +75,7 @@ def _draw_points(axis: "Axes", verdict: Verdict) -> None:
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 
 
-def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
+def _draw_margins(axis: Axes, verdict: Verdict) -> None:
     shown, count = list(verdict.margins.items())[:MAX_LIMITS][::-1], len(verdict.margins)
     if not shown:
         say_why_empty(axis, "nothing moved")
@@ -109,7 +103,7 @@ def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
     )
 
 
-def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
+def _draw_times(axis: Axes, rehearsal: Rehearsal) -> None:
     trials = [draw.trial for draw in rehearsal.draws if draw.trial.computed]
     times = np.array([trial.duration_s for trial in trials])
     done = np.array([trial.completed for trial in trials])
@@ -119,7 +113,7 @@ def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
     axis.legend()
 
 
-def _draw_influences(axis: "Axes", verdict: Verdict) -> None:
+def _draw_influences(axis: Axes, verdict: Verdict) -> None:
     shown = verdict.influences[:MAX_INFLUENCES][::-1]
     if not shown:
         axis.set_axis_off()

@@ -7,9 +7,9 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from rig.drawing.style import Figure
 
+if TYPE_CHECKING:
     from identification import FitProgress, Predictions
     from identification.common import Arrays, Attributes
     from rig.drawing.curves import Curves, View
@@ -199,7 +199,7 @@ class ResultKind:
         """Print a summary for a person."""
         self._table().say(summary)
 
-    def draw_on(self, page: "Figure", result: object) -> None:
+    def draw_on(self, page: Figure, result: object) -> None:
         """Draw a result on an empty page."""
         resolve_name(self.draw)(page, self.as_kept(result))
 

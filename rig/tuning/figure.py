@@ -8,14 +8,11 @@ import numpy as np
 
 from controller.tuning import Design
 from rig.drawing.page import check_ending, grid, page_for
-from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title, unit_text
+from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, say_why_empty, title, unit_text
 from rig.errors import RecordingError
 from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from rig.tuning import Tuning
 
 _STEP = 0.3
@@ -39,7 +36,7 @@ def draw_tuning(tuning: "Tuning", figure: Path) -> None:
         draw_on(page, tuning)
 
 
-def draw_on(page: "Figure", tuning: "Tuning") -> None:
+def draw_on(page: Figure, tuning: "Tuning") -> None:
     """Draw, from left to right: measured rig and fit; open loops with their margins; how the closed loops settle."""
     designs = (tuning.chosen.design, *tuning.chosen.others)
     axes = grid(page, 2, 3, down_columns=True)
@@ -55,7 +52,7 @@ def draw_on(page: "Figure", tuning: "Tuning") -> None:
     )
 
 
-def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
+def _draw_plant(size: Axes, phase: Axes, tuning: "Tuning") -> None:
     """Draw force and drive acceleration per volt, measured and fitted, and the coherence above the phase."""
     measured, plant = tuning.test.responses, tuning.plant
     fine = np.linspace(*plant.band_hz, 4000)
@@ -82,7 +79,7 @@ def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
 
 
-def _draw_bode(size: "Axes", phase: "Axes", design: Design) -> None:
+def _draw_bode(size: Axes, phase: Axes, design: Design) -> None:
     """Draw the open loops over the modulation frequency, with their margins, at the damping that was measured.
 
     The amplitude loop has two lines, for changes above and below the vibration's frequency; the phase of the second is
@@ -112,7 +109,7 @@ def _draw_bode(size: "Axes", phase: "Axes", design: Design) -> None:
     _legend_above(size, title="margins")
 
 
-def _draw_steps(lag: "Axes", level: "Axes", designs: tuple[Design, ...]) -> None:
+def _draw_steps(lag: Axes, level: Axes, designs: tuple[Design, ...]) -> None:
     """Draw phase error and level after steps, one line style per damping, up to twice the longest settling time."""
     stable = [(design, design.steps) for design in designs if design.steps is not None]
     if not stable:
@@ -136,7 +133,7 @@ def _draw_steps(lag: "Axes", level: "Axes", designs: tuple[Design, ...]) -> None
     level.legend(loc="lower right", title="damping: settles in")
 
 
-def _legend_above(axis: "Axes", columns: int = 1, title: str | None = None) -> None:
+def _legend_above(axis: Axes, columns: int = 1, title: str | None = None) -> None:
     axis.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2, title=title, alignment="left"
     )

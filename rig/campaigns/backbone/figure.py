@@ -1,23 +1,19 @@
 """Figure of a backbone: modal properties over the amplitude, and the history of the control loop."""
 
-from typing import TYPE_CHECKING
-
 from identification import IdentificationError, nonlinear_mode
 from rig.campaigns.backbone.points import recorded_backbone
 from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading
 from rig.drawing.axes import widen
 from rig.drawing.nonlinear_mode import draw_properties
 from rig.drawing.page import grid
+from rig.drawing.style import Figure
 from rig.recording.reader import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LEAST_SPAN = 1e-3
 """Smallest part of the frequency that its axis spans: less would show its scatter as if it were a change."""
 
 
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw frequency and damping over the amplitude, and the history of the control loop; if no point counts, only that."""
     try:
         mode = nonlinear_mode(recorded_backbone(recording))

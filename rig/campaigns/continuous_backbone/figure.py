@@ -1,7 +1,7 @@
 """Figure of a continuous backbone: the results of the way up and of the way down, their mean, and its 95 % band."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,12 +12,8 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.drawing.axes import log_axis, widen
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, say_why_empty
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, Axes, Figure, engineering, say_why_empty
 from rig.recording.reader import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LEAST_DETUNING = 0.002
 """Smallest detuning, relative, at which its axis ends."""
@@ -46,7 +42,7 @@ _WAYS = {"up": (SECOND, "^"), "down": (THIRD, "v")}
 """Colour and marker of each way, by the name of its field."""
 
 
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw the results of both ways, their differences from the mean, the loop over time, and how far off resonance it was.
 
     The phase error of the loop is not drawn: while the level is ramped, the lag swings by more than 180 deg and says nothing of
@@ -64,7 +60,7 @@ def draw(page: "Figure", recording: Recording) -> None:
     heading(page, recording)
 
 
-def draw_detuning(axis: "Axes", points: Sequence[Measured], accepted: float) -> None:
+def draw_detuning(axis: Axes, points: Sequence[Measured], accepted: float) -> None:
     """Draw how far the frequency was off resonance, at most, while a level was passed, in per cent of the frequency.
 
     The stored lag is that of a settled vibration at this detuning, ``tan(lag) = detuning / damping ratio``. The limit
@@ -89,7 +85,7 @@ def _detuning(point: Measured) -> float:
     return np.nan if lag is None or damping is None else float(np.tan(np.radians(lag)) * damping)
 
 
-def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
+def draw_ways(axes: Sequence[Axes], points: Sequence[Measured]) -> None:
     """Draw the modal frequency and damping of a recording's points over the amplitude, into two axes.
 
     A level that was passed on one way only is drawn on that way, and its value is marked in grey as not accepted.
@@ -113,7 +109,7 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
         axes[1].legend()
 
 
-def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
+def draw_differences(axes: Sequence[Axes], points: Sequence[Measured]) -> None:
     """Draw the differences of both ways from their mean, in per cent of the mean, with the 95 % band of the mean."""
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
         for some, scale_m, _said in _repeats(axis, points, f"{quantity.label.split(',')[0]}, way minus mean, %"):
@@ -136,7 +132,7 @@ def _of_way(points: Sequence[Measured], way: str, quantity: _Quantity) -> np.nda
     return np.array([getattr(value_of(point, way), quantity.name) for point in points], float)
 
 
-def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[tuple[list[Measured], float, bool]]:
+def _repeats(axis: Axes, points: Sequence[Measured], label: str) -> Iterator[tuple[list[Measured], float, bool]]:
     """Yield for each repeat: measured points by rising amplitude, the amplitude scale, and whether it is the first repeat."""
     measured = [point for point in points if point.vibration is not None]
     if not measured:
@@ -150,13 +146,13 @@ def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[t
     log_axis(axis, "x")
 
 
-def _band(axis: "Axes", points: Sequence[Measured], scale_m: float, mean: np.ndarray, std: np.ndarray) -> None:
+def _band(axis: Axes, points: Sequence[Measured], scale_m: float, mean: np.ndarray, std: np.ndarray) -> None:
     x = [scale_m * vibration_of(point).amplitude_m for point in points]
     axis.fill_between(x, mean - 1.96 * std, mean + 1.96 * std, color=MAIN, alpha=0.2, lw=0)
 
 
 def _line(
-    axis: "Axes",
+    axis: Axes,
     points: Sequence[Measured],
     scale_m: float,
     values: Sequence[float] | np.ndarray,

@@ -1,7 +1,6 @@
 """Figure of decays: their modal properties over the amplitude beside the settled points, and the amplitude over time."""
 
 from itertools import cycle
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,14 +8,11 @@ from identification import IdentificationError, nonlinear_mode
 from rig.campaigns.decay.points import recorded_decays, recorded_settled
 from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading
 from rig.drawing.page import grid
-from rig.drawing.style import COLOURS, MAIN, engineering
+from rig.drawing.style import COLOURS, MAIN, Figure, engineering
 from rig.recording.reader import Recording
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw modal frequency and damping of settled points and decays, and the history of the control loop."""
     try:
         settled, decays = nonlinear_mode(recorded_settled(recording)), recorded_decays(recording)

@@ -1,7 +1,5 @@
 """Figure of a dwell: frequency, damping, amplitude and force over the cycles, with the limits of the plan."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from rig.campaigns.dwell.points import DwellResult, recorded_course
@@ -9,20 +7,16 @@ from rig.campaigns.evaluation.figure import heading
 from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.axes import widen
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
+from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, engineering
 from rig.recording.reader import Recording
 from rig.recording.stored import StoredTable
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LEAST_SPAN = 1e-3
 """Smallest part of a value that its axis spans: less would show the scatter of the means as if it were a change."""
 NEAR = 0.2  # part of a limit from which on the limit is drawn: a distant limit would flatten the curve
 
 
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw the accepted means over the cycles. Limits are dashed; means that were not accepted are marked at the bottom."""
     course, plan = recorded_course(recording), recording.configuration["plan"]
     axes = grid(page, 2, 2)
@@ -50,7 +44,7 @@ def draw(page: "Figure", recording: Recording) -> None:
     heading(page, recording)
 
 
-def _limits(axis: "Axes", values: np.ndarray, plan: StoredTable, watched: str) -> None:
+def _limits(axis: Axes, values: np.ndarray, plan: StoredTable, watched: str) -> None:
     """Draw the alarm and abort limits on the side to which the quantity has changed."""
     if not watched or not np.isfinite(values[0]):
         return

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,13 +11,9 @@ from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.drawing.page import grid, text_below
-from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, rc, say_why_empty, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, Axes, Figure, rc, say_why_empty, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 AT_ONCE = 2**20  # rows that are read at a time
 _THIN = 0.7  # of the usual width: lines over time
@@ -48,12 +44,12 @@ def why_nothing_is_drawn(points: Sequence[Point[object]]) -> str:
     return "no point to draw" if first is None else f"no point was accepted; the first: {first.reason or first.quality}"
 
 
-def heading(page: "Figure", recording: Recording) -> None:
+def heading(page: Figure, recording: Recording) -> None:
     """Write a heading that describes the recording above a page."""
     title(page, describe(recording, f"{recording.kind} test"))
 
 
-def draw_failure(page: "Figure", recording: Recording) -> None:
+def draw_failure(page: Figure, recording: Recording) -> None:
     """Draw what there is of a recording without an accepted point: why there is none, and the history of the loop.
 
     The phase error is drawn if a loop controlled the phase.
@@ -69,7 +65,7 @@ def draw_failure(page: "Figure", recording: Recording) -> None:
     text_below(page, why)
 
 
-def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) -> None:
+def draw_history(frequency: Axes, error: Axes | None, recording: Recording) -> None:
     """Draw the loop over time: oscillator frequency with output amplitude, and phase error; mean and range of each bin.
 
     The ramp-down that ends a part is shaded. The phase is not controlled there, so its error is not drawn. ``error`` None: no
@@ -106,7 +102,7 @@ def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) 
         _label_error(error, largest)
 
 
-def _label_error(error: "Axes", largest: float) -> None:
+def _label_error(error: Axes, largest: float) -> None:
     error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-1.3 * largest, 1.3 * largest))
     handles, labels = error.get_legend_handles_labels()
     if handles:
@@ -118,13 +114,13 @@ def _label_error(error: "Axes", largest: float) -> None:
         say_why_empty(error, "nothing was recorded")
 
 
-def _shade_ramp(axis: "Axes", seconds: np.ndarray, running: np.ndarray) -> None:
+def _shade_ramp(axis: Axes, seconds: np.ndarray, running: np.ndarray) -> None:
     if running.size and not running[-1]:
         begin = int(np.flatnonzero(running)[-1]) if running.any() else 0
         axis.axvspan(seconds[begin], seconds[-1], color=REJECTED, alpha=0.25, lw=0, label="ramp-down")
 
 
-def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
+def _mark_points(axis: Axes, part: Part, start: int, rate: float) -> float:
     """Mark the phase error of every recorded fundamental of a part; return the largest absolute value, deg."""
     marks = [
         (0.5 * (point.rows.first_sample + point.rows.end_sample), point.lock.phase_error_deg)
@@ -174,7 +170,7 @@ def _usual_error_deg(part: Part) -> float:
     return float(np.quantile(errors, 0.995)) if errors.size else 0.0
 
 
-def _band(axis: "Axes", seconds: np.ndarray, bins: _Bins, label: str | None = None) -> None:
+def _band(axis: Axes, seconds: np.ndarray, bins: _Bins, label: str | None = None) -> None:
     """Draw the mean of each bin as a line and its range as a band; plain decimation would alias the detector's ripple."""
     axis.fill_between(seconds, bins.least, bins.most, color=MAIN, alpha=0.25, lw=0)
     axis.plot(seconds, bins.mean, color=MAIN, lw=_THIN * rc("lines.linewidth"), label=label)

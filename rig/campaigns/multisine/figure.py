@@ -1,7 +1,5 @@
 """Figure of a multisine test: amplitude spectra with their noise, and the frequency response."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from identification import IdentificationError, InstrumentResponse, PeriodicSpectra, coherence
@@ -11,18 +9,25 @@ from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.multisine.points import recorded_spectra
 from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, rc, say_why_empty, title as heading, unit_text
+from rig.drawing.style import (
+    MAIN,
+    REJECTED,
+    SECOND,
+    THIRD,
+    Axes,
+    Figure,
+    rc,
+    say_why_empty,
+    title as heading,
+    unit_text,
+)
 from rig.recording.reader import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _DOT = 0.7
 """Size of the dots of a spectrum, over the usual size of markers."""
 
 
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw the highest level of a recording."""
     spectra = recorded_spectra(recording)
     level, at_level = max(spectra.items())
@@ -34,7 +39,7 @@ def draw(page: "Figure", recording: Recording) -> None:
     draw_multisine(page, at_level, title=text + (f", {left_out}" if left_out else ""))
 
 
-def draw_multisine(page: "Figure", spectra: PeriodicSpectra, *, title: str = "") -> None:
+def draw_multisine(page: Figure, spectra: PeriodicSpectra, *, title: str = "") -> None:
     """Draw amplitude spectra of voltage, force and response, and the frequency response with its noise and coherence.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Lines that are not excited have separate marks for odd and even. What
@@ -56,7 +61,7 @@ def _counted(number: int, thing: str) -> str:
     return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
-def _spectrum(axis: "Axes", spectra: PeriodicSpectra, name: str, text: str) -> None:
+def _spectrum(axis: Axes, spectra: PeriodicSpectra, name: str, text: str) -> None:
     row, excited = spectra.index(name), spectra.excited
     amplitude, noise = spectra.amplitude[row], spectra.noise_std[row]
     dots = {"ls": "", "markersize": _DOT * rc("lines.markersize")}
@@ -78,7 +83,7 @@ def _spectrum(axis: "Axes", spectra: PeriodicSpectra, name: str, text: str) -> N
     log_axis(axis, least_span=10.0)  # a flat spectrum stays flat
 
 
-def _response(size: "Axes", phase: "Axes", measured: InstrumentResponse, text: str) -> None:
+def _response(size: Axes, phase: Axes, measured: InstrumentResponse, text: str) -> None:
     frequency = measured.frequency_hz
     size.semilogy(frequency, np.abs(measured.value), ".-", color=MAIN, label=text)
     if np.any(measured.noise_std > 0.0):
@@ -92,7 +97,7 @@ def _response(size: "Axes", phase: "Axes", measured: InstrumentResponse, text: s
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-100.0, 280.0), yticks=(-90, 0, 90, 180, 270))
 
 
-def _coherence(axis: "Axes", spectra: PeriodicSpectra, response: str, force: str) -> None:
+def _coherence(axis: Axes, spectra: PeriodicSpectra, response: str, force: str) -> None:
     """Draw the coherence of response and force over all periods of all realisations: noise and distortion lower it."""
     axis.set(xlabel="frequency, Hz", ylabel=f"coherence, {response}–{force}", ylim=(0.0, 1.05))
     try:

@@ -1,7 +1,6 @@
 """Figure of a stepped-phase test: responses at constant level, drawn along their branches."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +13,14 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.axes import from_zero
 from rig.drawing.folding import folds_back
 from rig.drawing.page import NARROW_IN, grid, legend_below
-from rig.drawing.style import REJECTED, rc, shade, title as heading
+from rig.drawing.style import REJECTED, Axes, Figure, rc, shade, title as heading
 from rig.recording.reader import Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _THIN = 0.7  # of the usual line width; chosen
 NEAR_DEG = 5.0  # of phase resonance: the point that is marked as resonant
 
 
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw every level of a recording along its branch."""
     draw_stepped_phase(
         page,
@@ -36,7 +31,7 @@ def draw(page: "Figure", recording: Recording) -> None:
 
 
 def draw_stepped_phase(
-    page: "Figure",
+    page: Figure,
     responses: Sequence[FrequencyResponse],
     *,
     title: str = "",
@@ -81,7 +76,7 @@ def draw_stepped_phase(
     heading(page, title)
 
 
-def _panels(page: "Figure") -> tuple["Axes", "Axes", "Axes"]:
+def _panels(page: Figure) -> tuple[Axes, Axes, Axes]:
     """Give a large panel beside two small ones, or three below one another on a narrow page."""
     if page.get_figwidth() < NARROW_IN:
         amplitude, lag, force = grid(page, 3, height_ratios=(1.5, 1.0, 1.0))[:, 0]
@@ -105,7 +100,7 @@ def gaps(phase_lag_deg: NDArray[np.float64], lags_deg: Sequence[float]) -> NDArr
 
 
 def _branch(
-    axis: "Axes",
+    axis: Axes,
     item: FrequencyResponse,
     values: NDArray[np.float64],
     colour: object,

@@ -1,7 +1,6 @@
 """Figure of a stepped-sine test: force, displacement, lag and accelerance over frequency."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,26 +10,20 @@ from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import REJECTED, shade, title as heading
+from rig.drawing.style import REJECTED, Axes, ColorType, Figure, shade, title as heading
 from rig.recording.reader import Recording
 from vibrolock.arrays import Float
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.typing import ColorType
-
 
 _JUMP = 1.5  # times the amplitude of the previous point
 
 
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw every level of a recording."""
     responses = recorded_frequency_responses(recording)
     draw_stepped_sine(page, responses, title=describe(recording, "stepped sine"))
 
 
-def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *, title: str = "") -> None:
+def draw_stepped_sine(page: Figure, responses: Sequence[FrequencyResponse], *, title: str = "") -> None:
     """Draw force, displacement amplitude, phase lag and accelerance over frequency, one line per level.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement, so that jumps and the
@@ -62,7 +55,7 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
 
 
 def _stepped(
-    axis: "Axes", measured: FrequencyResponse, values: Float, colour: "ColorType", label: str | None = None
+    axis: Axes, measured: FrequencyResponse, values: Float, colour: ColorType, label: str | None = None
 ) -> None:
     """Draw points in the order of measurement. Two points between which the amplitude jumps are joined by a dotted line."""
     frequency_hz, amplitude_m = measured.frequency_hz, measured.amplitude_m

@@ -1,7 +1,5 @@
 """Figure of a sweep: voltage, force, response and instantaneous frequency over time."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from identification import ForceDropOut, Transient, force_drop_out, zero_crossings
@@ -12,20 +10,15 @@ from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
 from rig.drawing.page import columns_for, grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, title as heading, unit_text
+from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, Axes, Figure, title as heading, unit_text
 from rig.recording.reader import Recording
 from vibrolock.arrays import Float
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _TELLS = 0.98
 """Share of the zero crossings that must lie on the frequency axis for them to be drawn."""
 
 
-def draw(page: "Figure", recording: Recording) -> None:
+def draw(page: Figure, recording: Recording) -> None:
     """Draw the last accepted sweep of a recording. A drop-out of the force is marked unless a loop held the force."""
     sweeps = recorded_sweeps(recording)
     number, sweep = list(sweeps.items())[-1]
@@ -47,7 +40,7 @@ def draw(page: "Figure", recording: Recording) -> None:
 
 
 def draw_sweep(
-    page: "Figure",
+    page: Figure,
     sweep: Transient,
     samples: np.ndarray,
     sample_rate_hz: float,
@@ -94,7 +87,7 @@ def draw_sweep(
     heading(page, title)
 
 
-def _signal(axis: "Axes", values: Float, period: int, rate_hz: float) -> None:
+def _signal(axis: Axes, values: Float, period: int, rate_hz: float) -> None:
     """Draw the range of a signal within one period around each instant; single oscillations would not be visible."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -103,7 +96,7 @@ def _signal(axis: "Axes", values: Float, period: int, rate_hz: float) -> None:
     axis.fill_between(at / rate_hz, lowest, highest, color=MAIN, alpha=0.35, lw=0, label="signal")
 
 
-def _momentary_frequency(axis: "Axes", sweep: Transient, force: np.ndarray, rate_hz: float) -> None:
+def _momentary_frequency(axis: Axes, sweep: Transient, force: np.ndarray, rate_hz: float) -> None:
     """Draw the frequency of the voltage, of the force's fundamental, and from the zero crossings of the force.
 
     Zero crossings are left out where harmonics add some or shift them, so that they do not tell a frequency.
@@ -124,7 +117,7 @@ def _momentary_frequency(axis: "Axes", sweep: Transient, force: np.ndarray, rate
     axis.set(ylabel="frequency, Hz", ylim=(low - margin, high + margin))
 
 
-def _mark_drop_out(force: "Axes", response: "Axes", drop_out: ForceDropOut) -> None:
+def _mark_drop_out(force: Axes, response: Axes, drop_out: ForceDropOut) -> None:
     """Mark the force off resonance, its minimum and overshoot, and the peak response, with their values."""
     force.axhline(drop_out.off_resonance_n, color=REJECTED, lw=0.8, ls="--")
     for name, marker in (("minimum", "v"), ("overshoot", "^")):
