@@ -22,6 +22,8 @@ class SoundDevice(NamedTuple):
     """Number of its outputs."""
     rate_hz: float
     """Rate at which it runs by default, Hz."""
+    delay_s: float
+    """Delay from output to input that it promises, s; many devices promise too little."""
 
     @property
     def text(self) -> str:
@@ -76,6 +78,7 @@ def sound_devices() -> list[SoundDevice]:
             device["max_input_channels"],
             device["max_output_channels"],
             device["default_samplerate"],
+            device["default_low_input_latency"] + device["default_low_output_latency"],
         )
         for device in audio.query_devices()
     ]

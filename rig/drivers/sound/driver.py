@@ -61,7 +61,7 @@ class SoundDAQ(DAQ):
         self._device: SoundDevice | None = None
         self._rate_hz, self._factor = bench.sample_rate_hz, 1
         self._stream: DuplexStream | None = None
-        self._delay_frames: float | None = None
+        self._delay_frames = 0.0
         self._latency_from = ""
         self._interpolate, self._decimate = Interpolator(1), Decimator(1, 1)
         self._due = 0
@@ -78,14 +78,13 @@ class SoundDAQ(DAQ):
 
     @property
     def latency_samples(self) -> float:
-        """Queue, both filters, and the delay of the stream."""
-        frames = self._delay_frames or 0.0
-        return self._options.queue * self.block + self._filters + frames / self._factor
+        """Queue, both filters, and the delay of the stream: before the start two periods, or what the device promises."""
+        return self._options.queue * self.block + self._filters + self._delay_frames / self._factor
 
     @property
     def filter_delay_samples(self) -> float:
         """Delay of the decimation, and of the stream behind the output."""
-        return self._filters / 2 + (self._delay_frames or 0.0) / self._factor
+        return self._filters / 2 + self._delay_frames / self._factor
 
     @property
     def queue_samples(self) -> int:
@@ -189,6 +188,7 @@ class SoundDAQ(DAQ):
                 allowed=f"up to {PASS_BAND * bench.sample_rate_hz:g} Hz, or sample_rate_hz = {self._rate_hz:g}",
             )
         self._check_scales(device)
+        self._delay_frames = max(2.0 * options.period_frames, device.delay_s * self._rate_hz)
         self._device = device
 
     def _check_scales(self, device: SoundDevice) -> None:

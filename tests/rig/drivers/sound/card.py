@@ -39,6 +39,7 @@ class Card:
         self.adc_s = 10.0
         self.fault = ""
         self.slow = 1.0
+        self.promised_s = 0.0
         self.stamps = delay / RATE_HZ
         self.drive = None
         self.stream = None
@@ -66,6 +67,8 @@ class Card:
                 "max_input_channels": inputs,
                 "max_output_channels": outputs,
                 "default_samplerate": self.rates[-1],
+                "default_low_input_latency": self.promised_s / 2,
+                "default_low_output_latency": self.promised_s / 2,
             }
             for index, (name, host, inputs, outputs) in enumerate(self.devices)
         ]

@@ -120,6 +120,15 @@ def test_delay_is_measured_through_the_cable_whatever_the_stamps_say(card, delay
         assert not driven.daq.remarks
 
 
+@pytest.mark.parametrize(("promised_s", "frames"), [(0.0, 256), (0.02, 960)])
+def test_before_the_start_two_periods_or_what_the_device_promises_are_presumed(card, promised_s, frames):
+    card(delay=300).promised_s = promised_s
+    with make_daq(bench()) as daq:
+        assert daq.filter_delay_samples == pytest.approx(frames)
+        daq.start(128)
+        assert daq.filter_delay_samples == pytest.approx(300, abs=0.01)
+
+
 def test_stamps_count_without_a_cable_and_are_said_not_to_be_trusted(card):
     card(delay=256).stamps = 300.0 / RATE_HZ
     with Driven(bench(loopback=False)) as driven:
