@@ -9,7 +9,7 @@ import math
 
 from vibrolock.compiled import kernel
 
-TWO_PI = 2.0 * math.pi
+TWO_PI = 2.0 * math.pi  # rad in a turn
 LARGEST_ERROR = 1.0  # of a logarithm: a factor of e; a larger error counts as this one
 
 

@@ -14,7 +14,7 @@ from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
 
 SLOPE_FORGETS = 0.5  # rate at which the slope estimate forgets, as a fraction of the loop's integral gain
-STEEPEST = 10.0
+STEEPEST = 10.0  # largest slope by which the loop's gain is divided; chosen
 UNMOVED = 1e-7  # square of a logarithmic change (0.03 %) below which the slope estimate tends to 1
 SMALLEST_M = 1e-15  # about the size of an atomic nucleus: lower bound of displacements in logarithms
 

@@ -48,7 +48,7 @@ class SiteKind(IntEnum):
 MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER, DROOP, FORCE_TABLE, DAMPING_TABLE = (
     int(kind) for kind in SiteKind
 )
-N_PARAMETER = 8
+N_PARAMETER = 8  # numbers that a user's function is given; chosen
 N_NODE = 513
 """Nodes of a table."""
 

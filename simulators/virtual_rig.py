@@ -24,7 +24,7 @@ from simulators.structures.structure import ModalStructure, Structure
 from simulators.wear import Wear
 from vibrolock.errors import InputError
 
-_OPEN, _LOOSE_N_M = 1e4, 1e-6
+_OPEN, _LOOSE_N_M = 1e4, 1e-6  # factor of an open circuit's resistance; N/m, stiffness of a detached stinger; chosen
 
 
 class VirtualRig(Part):

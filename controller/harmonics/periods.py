@@ -14,7 +14,7 @@ SWING = 4.0  # times the bound of the mean error: bound of its root mean square
 PATIENCE = 40  # periods at a held level after which an error must have decayed
 DECAYED = 0.7  # to this part, while all else is steady
 GROWN = 4.0  # factor by which no error may grow at a held level
-MOST_PROBES = 4
+MOST_PROBES = 4  # times that errors may have the plant measured again; then the point does not settle (decision 70)
 LOUDER = 1.5  # times the output at which a harmonic was found too quiet: where it is tried again
 JUDGED = 0.2  # weight of the last period in the slow means
 

@@ -5,7 +5,7 @@ from enum import IntEnum
 from controller.adaptive_filter import MOST_HARMONICS
 from vibrolock.arrays import record
 
-ORDERS = (MOST_HARMONICS + 1,)
+ORDERS = (MOST_HARMONICS + 1,)  # shape of arrays by harmonic; harmonic 0 is the mean
 
 
 class HarmonicStage(IntEnum):

@@ -13,8 +13,8 @@ from controller.harmonics.records import HARMONICS, ORDERS
 from controller.settings import Settings
 from vibrolock.errors import InputError
 
-LARGEST_WANTED = 10.0
-SMALLEST_MARGIN_DEG = 35.0
+LARGEST_WANTED = 10.0  # largest ratio of a prescribed harmonic to the fundamental; chosen
+SMALLEST_MARGIN_DEG = 35.0  # deg; smallest phase margin of the harmonics loop; chosen
 HIGHEST_TURN = 0.8 * math.pi  # of the highest harmonic from sample to sample
 
 

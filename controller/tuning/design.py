@@ -17,8 +17,8 @@ from vibrolock.arrays import Complex, Float
 from vibrolock.errors import InputError
 
 LEVEL_STEP = 0.3  # relative step, about that of a backbone with ten levels over a decade
-POOR_SENSITIVITY = 3.0
-POOR_FIT = 0.1
+POOR_SENSITIVITY = 3.0  # largest max abs(S) of a loop that is accepted; chosen
+POOR_FIT = 0.1  # largest accepted misfit of the plant's model, relative to its measurement; chosen
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from identification.continuation.path import Steps, System
 from identification.errors import IdentificationError
 from vibrolock.arrays import Float
 
-_GROWTH = 1.5
+_GROWTH = 1.5  # factor of the step length after an easy step; chosen
 _EASY = 3
 """Largest number of Newton iterations after which the step length may grow."""
 _AHEAD = 20.0

@@ -21,9 +21,9 @@ from vibrolock.arrays import Float
 
 SAMPLES_PER_PERIOD = 25
 """Samples per period of the highest excited frequency."""
-_ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)
-_SAME = 1e-9
-_EXCITED = 1e-2
+_ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)  # leading digits of a round sample rate; chosen
+_SAME = 1e-9  # relative difference up to which two rates are equal; chosen: rounding only
+_EXCITED = 1e-2  # amplitude of an excited line, at least, over the strongest of its channel; chosen
 
 
 def round_rate_hz(most_hz: float) -> float:

@@ -19,7 +19,7 @@ from vibrolock.arrays import Float
 
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 
-_BAND = (0.85, 1.15)
+_BAND = (0.85, 1.15)  # limits of the band, when none is given, over the resonance frequency; chosen
 
 
 def held_values(model: Driven, held_inputs: Mapping[str, float] | None) -> tuple[int, NDArray[np.float64]]:

@@ -25,7 +25,7 @@ _SAME = 1e-6
 """Relative difference, over one period, up to which two eigenvalues are copies of one multiplier."""
 _REAL_RAD = 1e-3
 """Angle of a multiplier over one period within which it counts as real."""
-_MARGIN = 1e-9
+_MARGIN = 1e-9  # growth over one sample that still counts as stable; chosen: rounding only
 
 
 def multipliers(states_by: Float, turn: Float, basis: Basis, angle_rad: float) -> Complex:

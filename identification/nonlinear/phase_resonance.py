@@ -43,9 +43,9 @@ _NO_SHAPE = (
     "no mass-normalised mode shape: damping, modal amplitude and the correction for the phase error cannot be had; "
     "give drive_mode_shape or mode_shapes"
 )
-_FAR_FROM_RESONANCE_DEG = 15.0
-_FEW_LEVELS = 4
-_FEW_PERIODS = 10
+_FAR_FROM_RESONANCE_DEG = 15.0  # deg; a lag farther from 90 deg is noted; chosen
+_FEW_LEVELS = 4  # fewer distinct levels are noted; chosen
+_FEW_PERIODS = 10  # fewer periods of a point are noted; chosen
 _DROWNED = 3.0  # least ratio of force and motion to their standard errors
 
 

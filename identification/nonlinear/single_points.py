@@ -24,7 +24,7 @@ from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from vibrolock.arrays import Complex, Float
 
-_FAR_DEG = 30.0
+_FAR_DEG = 30.0  # deg; a lag farther from 90 deg is noted; chosen
 
 
 def single_point_mode(

@@ -29,7 +29,7 @@ from identification.frequency_responses import FrequencyResponse
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from vibrolock.arrays import Complex, Float
 
-_LEVEL_TOLERANCE = 0.02
+_LEVEL_TOLERANCE = 0.02  # relative deviation from the level up to which a point counts as held; chosen
 _ENOUGH_POINTS = 5  # with fewer points the window is widened
 _MIN_POINTS = 3  # six equations for four unknowns
 _SAID_APART = 2e-4  # relative distance of phase resonance from the modal frequency above which a note is made

@@ -25,7 +25,7 @@ from identification.signals.rounding import part_of_each
 from vibrolock.arrays import Complex, Float
 
 _BOUNDED = ("mac", "force_purity", "response_purity")
-_TAILS = (2.5, 97.5)
+_TAILS = (2.5, 97.5)  # %; percentiles at the ends of a 95 % interval
 _STANDS_OUT = 2.5  # multiple of its standard error per part; noise alone causes such a drift in 4 % of cases
 
 

@@ -10,9 +10,9 @@ from identification.errors import IdentificationError
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
-_NEAR_THE_TOP = 0.9
+_NEAR_THE_TOP = 0.9  # smallest neighbour of the largest point, relative, for a parabola through them; chosen
 
-FLAGGED_BEYOND = 1.25
+FLAGGED_BEYOND = 1.25  # use of the identified range above which a prediction has a note (decision 24)
 
 
 def peak_of(amplitude: Float, *columns: Float) -> tuple[float, ...]:

@@ -24,9 +24,9 @@ from identification.response_control.levels import LevelFit, LevelPoints, best_d
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
-LEAST_LEVELS = 3
-_SAME_LEVEL = 1e-6
-_LAGS_DEG = np.arange(30.0, 150.5, 1.0)
+LEAST_LEVELS = 3  # fewest levels that make a force surface; chosen
+_SAME_LEVEL = 1e-6  # relative difference up to which two levels are one; chosen: rounding only
+_LAGS_DEG = np.arange(30.0, 150.5, 1.0)  # deg; lags of a curve when none are given; chosen
 
 
 @dataclass(frozen=True, eq=False)

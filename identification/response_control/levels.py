@@ -17,11 +17,11 @@ import numpy as np
 from identification.errors import IdentificationError
 from vibrolock.arrays import Complex, Float
 
-HIGHEST_DEGREE = 4
-_LEAST_POINTS = 4
+HIGHEST_DEGREE = 4  # largest degree of the polynomial in frequency that is fitted to a level; chosen
+_LEAST_POINTS = 4  # fewest points of a level; chosen
 _SPARE_POINTS = 2
 """Number of points beyond the degree that a fit needs to estimate the scatter: one more than coefficients."""
-_GRID = 201
+_GRID = 201  # number of frequencies of a level at which its lag is tabulated; chosen
 _NEWTON = 2
 """Number of Newton steps from the lag on the grid to the exact one."""
 _MARGIN = 0.02

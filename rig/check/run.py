@@ -23,7 +23,7 @@ CLEAR_COHERENCE = 0.9999
 """Coherence of the best channel above which a dead one will not appear at a higher level either."""
 DEAD_COHERENCE = 0.1  # coherence below which a channel is dead at a level; chosen
 SILENT_S = 3.0  # silence before the multisine, s; chosen
-SEARCH = LevelSearch(safe_share=0.1, least_rise=1.2, most_levels=5)
+SEARCH = LevelSearch(safe_share=0.1, least_rise=1.2, most_levels=5)  # see `LevelSearch`; chosen
 
 
 def check(

@@ -7,7 +7,7 @@ import numpy as np
 from rig.drawing.page import NARROW_IN
 from rig.drawing.style import Figure, SubFigure, height_is_free, rc
 
-_PANEL_IN = 1.65
+_PANEL_IN = 1.65  # inches; height of a panel on a narrow page; chosen
 
 
 def is_narrow(page: Figure) -> bool:

@@ -11,9 +11,9 @@ from rig.drawing.page import grid
 from rig.drawing.steady_curve import UNSTABLE, draw_stability
 from rig.drawing.style import COLOURS, REJECTED, Axes, Figure, legend_above, length_factor, plain_log, shade, title
 
-_CURVES = 4
-_SECTIONS_DEG = (30.0, 90.0, 150.0)
-_MOST_NAMED = 8
+_CURVES = 4  # curves at constant force, at forces in geometric progression; chosen
+_SECTIONS_DEG = (30.0, 90.0, 150.0)  # deg; phase lags of the sections: resonance and both flanks; chosen
+_MOST_NAMED = 8  # levels up to which the legend names each; beyond, the lowest and highest only; chosen
 
 
 class MeasuredSurface(Protocol):

@@ -9,7 +9,7 @@ from rig.drawing.axes import widen
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, engineering, say_why_empty, title
 
-_GAIN_ERROR = 0.02
+_GAIN_ERROR = 0.02  # relative error of a sensor's sensitivity that is assumed; chosen
 SHAPE_FLOOR = _GAIN_ERROR**2 / 4.0
 """1 - MAC of two equal components, one of them wrong by 2 %: a smaller change of shape is not told from a sensor's error."""
 

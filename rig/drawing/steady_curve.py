@@ -11,8 +11,8 @@ BEYOND = 1.0
 UNSTABLE = (0, (1.2, 1.2))
 """Line style of unstable vibrations."""
 _CUT = "the response from "
-_VISIBLE = 0.15
-_SAME = 1e-6
+_VISIBLE = 0.15  # amplitude at a branch's end, over the largest, above which the end is explained; chosen
+_SAME = 1e-6  # relative difference up to which two frequencies are one; chosen
 _EDGE = "the range of the model ends"
 
 

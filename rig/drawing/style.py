@@ -34,8 +34,8 @@ MARKERS = "os^Dv<>P"
 
 _LETTER = 0.56
 """Mean width of a letter over the size of its font (DejaVu Sans)."""
-TRACE_BINS = 1200
-_MM_PER_IN = 25.4
+TRACE_BINS = 1200  # parts of a drawn trace of samples; chosen
+_MM_PER_IN = 25.4  # mm in an inch, by definition
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import BinaryIO
 from rig.errors import RecordingError
 from rig.system.child import MEMORY_BYTES, ChildFailed, ask_child
 
-_MAGIC, _VERSION = b"VLDIGEST", 1
+_MAGIC, _VERSION = b"VLDIGEST", 1  # first bytes of the trailer, and version of its layout
 _TRAILER = struct.Struct("<8sI32sQ")
 _AT_ONCE = 2**20  # bytes that are digested at a time; chosen
 

@@ -14,7 +14,7 @@ CPU_VARIABLE = "VIBROLOCK_LOOP_CPU"
 """Environment variable with the number of the processor to which the loop is bound."""
 
 NICE = 5  # niceness (0 to 19) of what only watches; chosen: the loop goes first
-LOCK_CURRENT, LOCK_FUTURE = 1, 2
+LOCK_CURRENT, LOCK_FUTURE = 1, 2  # <sys/mman.h>
 SET_TIMER_SLACK = 29  # <sys/prctl.h>
 NO_SUCH = "not on this system"
 

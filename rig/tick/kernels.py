@@ -39,9 +39,7 @@ from rig.tick.sequencer.layout import Drive, SegmentKind
 from vibrolock.compiled import Record, inner_kernel, kernel
 
 SMALLEST_V = 1e-12  # lower bound of a divisor, against an output of zero
-UNREACHED = (
-    0.98  # of the level; a held quantity below it has not reached its level if the output is at the voltage limit
-)
+UNREACHED = 0.98  # of the level; chosen: at the voltage limit, a held quantity below it has not reached its level
 
 
 @kernel

@@ -55,7 +55,7 @@ MIN_SPAN = 1.5  # highest level over lowest that rounding may reduce it to; the 
 MIN_FORCE_BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
 MAX_NONHARMONIC = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
 NARROW_SPAN = 10.0  # span below which rounding may add more, and the plan accepts more
-RELAXED_NONHARMONIC, ACCEPTED_NONHARMONIC = 0.15, 0.25
+RELAXED_NONHARMONIC, ACCEPTED_NONHARMONIC = 0.15, 0.25  # of the force's RMS: these two then; chosen
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ MAX_REFINEMENT = 32.0  # most by which the spacing of the lines is reduced after
 GOOD_COHERENCE = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
 MIN_COHERENCE = 0.9  # least coherence of a level chosen by the user, or of the highest that the limits allow
 MAX_CREST_FACTOR = 4.0  # largest expected ratio of peak to RMS of a multisine's response
-SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)
+SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)  # see `LevelSearch`; chosen
 
 
 @dataclass(frozen=True, eq=False)

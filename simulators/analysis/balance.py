@@ -22,8 +22,8 @@ from vibrolock.arrays import Complex, Float
 
 _TOLERANCE = 1e-9
 """Largest residual, relative to the magnitude of the terms of the equation."""
-_ITERATIONS = 20
-_HALVINGS = 4
+_ITERATIONS = 20  # most Newton iterations; chosen
+_HALVINGS = 4  # most trials of a step, each half as long as the one before; chosen
 _LARGEST_FREQUENCY_STEP = 0.05
 """Largest change of the frequency in one iteration, relative."""
 

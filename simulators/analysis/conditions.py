@@ -23,8 +23,8 @@ _NAMES: dict[Held, tuple[str, str]] = {
     "response": ("response", "m"),
     "voltage": ("voltage", "V"),
 }
-_LAG_LIMITS_DEG = (-179.0, -1.0)
-_SAMPLES_PER_HARMONIC = 4
+_LAG_LIMITS_DEG = (-179.0, -1.0)  # deg; lags that may be asked for, one degree inside those of no active power; chosen
+_SAMPLES_PER_HARMONIC = 4  # fewest samples in a period of the highest harmonic, twice the sampling theorem's; chosen
 _MOVES_A_SITE = 0.01
 """A mode moves a site if its deflection there exceeds this share of the largest of all modes."""
 

@@ -21,9 +21,9 @@ from simulators.analysis.responses import PeriodicResponses
 from simulators.virtual_rig import VirtualRig
 from vibrolock.errors import InputError
 
-RESONANCE_DEG = -90.0
-_FROM_BELOW_TO_ABOVE = (-175.0, -5.0)
-_LAGS = 86
+RESONANCE_DEG = -90.0  # deg; lag of the acceleration behind the force at phase resonance, by definition
+_FROM_BELOW_TO_ABOVE = (-175.0, -5.0)  # deg; first and last lag of a whole curve; chosen
+_LAGS = 86  # lags of a whole curve, 2 deg apart; chosen
 
 
 def phase_resonance_backbone(

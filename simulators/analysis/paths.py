@@ -14,11 +14,11 @@ from simulators.analysis.force_control import ForceControl, ForceHarmonics
 from simulators.analysis.responses import NotConvergedError, PeriodicResponses
 from simulators.virtual_rig import VirtualRig
 
-_RESONANCE_RAD = -0.5 * math.pi
+_RESONANCE_RAD = -0.5 * math.pi  # rad; lag of the acceleration behind the force at phase resonance
 _NEARLY_LINEAR = 1e-3
 """Share of the first level at which a path starts, from the vibration of the linear rig."""
-_DEEPEST = 8
-_LARGEST_LAG_STEP = 0.6
+_DEEPEST = 8  # most times in a row that a failing step is halved; chosen
+_LARGEST_LAG_STEP = 0.6  # rad; chosen, see below
 _LARGEST_LEVEL_RATIO = 4.0
 """Largest steps of the lag (rad) and the level; beyond, Newton may converge to another vibration of the same conditions."""
 

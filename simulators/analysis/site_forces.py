@@ -17,7 +17,7 @@ from vibrolock.errors import InputError
 
 _RELATIVE_STEP = 6e-6
 """Half step of the central differences relative to the motion's amplitude, near the cube root of the rounding error."""
-_SMALLEST_STEP = 1e-15
+_SMALLEST_STEP = 1e-15  # m, or m/s; lower bound of that half step, for a site at rest; chosen
 
 
 class Series:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from simulators.sensing.parts import TAPS, Converter, Sensor
 from vibrolock.arrays import Float
 
-_IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
+_IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])  # a section that changes nothing
 
 
 def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Float:

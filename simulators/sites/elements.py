@@ -16,8 +16,8 @@ from simulators.part import Part, Positive, Several
 from simulators.sites.functions import loaded, named, portable
 from vibrolock.errors import InputError
 
-VALID_SHARE_OF_GAP = 0.7
-LARGEST_FORCE_AT_REST_N = 1e-9
+VALID_SHARE_OF_GAP = 0.7  # largest deflection for which a magnet's law counts as valid, over the gap; chosen
+LARGEST_FORCE_AT_REST_N = 1e-9  # N; a user's force at rest that still counts as zero; chosen
 
 
 class LocalElement(Part):

@@ -4,8 +4,8 @@ import numpy as np
 
 from vibrolock.compiled import kernel
 
-DONE = 0
-DIVERGED = 1
+DONE = 0  # code: integrated to the end
+DIVERGED = 1  # code: the amplitude exceeded the largest allowed
 
 
 @kernel

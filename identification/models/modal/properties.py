@@ -25,9 +25,9 @@ REFUSED_BEYOND = 2.0
 """Use of the identified range up to which predictions are made unless more is allowed (decision 24)."""
 HIGHER_LEVELS = "measure higher levels, or allow extrapolation (`largest_range_use`)"
 """Advice of an `ExtrapolationError`, for Python and the command line."""
-_TAIL_FROM = 0.5
-_FEWEST_TAIL_LEVELS = 3
-_SAME_LEVEL = 0.02
+_TAIL_FROM = 0.5  # share of the largest modal amplitude from which levels are extrapolated by a line; chosen
+_FEWEST_TAIL_LEVELS = 3  # levels that the line of the extrapolation takes at least, where there are so many; chosen
+_SAME_LEVEL = 0.02  # relative distance of modal amplitudes that are averaged as one level; chosen
 _LOWEST_OF_LAST = 0.01  # w^2 of a strongly softening mode ends at this share of its last value
 _DAMPING_FIELD = {"fundamental": "damping_ratio", "total-power": "damping_ratio_total_power"}
 

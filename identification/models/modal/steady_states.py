@@ -32,8 +32,8 @@ from identification.prediction.steady_prediction import FLAGGED_BEYOND
 from identification.validation import one_specimen
 from vibrolock.arrays import Complex, Float
 
-_LOWEST_SHARE = 1e-4
-_GRID = 4000
+_LOWEST_SHARE = 1e-4  # lowest amplitude that is searched, over the highest; chosen
+_GRID = 4000  # number of amplitudes between which changes of sign are looked for; chosen
 
 
 def modal_stiffness(properties: ModalProperties, q: Float, omega: Float) -> Complex:

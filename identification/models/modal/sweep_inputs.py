@@ -14,10 +14,10 @@ from vibrolock.arrays import Complex, Float
 BY_ZERO_CROSSINGS = "force by zero crossings"
 """Origin of a force without the phase of the sweep; predictions from it have no phase to compare."""
 
-_INSTANTS_PER_PERIOD = 16
-_FEWEST_PER_PERIOD = 8
-_MOST_INSTANTS = 20_000_000
-_UNEVEN = 1e-6
+_INSTANTS_PER_PERIOD = 16  # instants in a period of the highest frequency; chosen
+_FEWEST_PER_PERIOD = 8  # instants in a period of the highest frequency that thinning keeps; chosen
+_MOST_INSTANTS = 20_000_000  # instants of one sweep; chosen: more hint at crossings of noise
+_UNEVEN = 1e-6  # relative difference of time steps that still count as equal; chosen: rounding only
 
 
 @dataclass(frozen=True, eq=False)

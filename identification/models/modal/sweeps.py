@@ -42,14 +42,14 @@ from vibrolock.arrays import Complex, Float
 
 _Tables = tuple[Float, Float, Float, Float, Float]
 
-_TABLE_SIZE = 1024
+_TABLE_SIZE = 1024  # frequencies at which exciter and other modes are tabulated; chosen
 _UNBOUNDED = 1e3
 """Use of the identified range at which the integration ends if any extrapolation is allowed. Chosen."""
-_AT_REST = 1e-3
+_AT_REST = 1e-3  # first drive over the largest, up to which the sweep starts from rest; chosen
 _SETTLED = 12.0
 """Time constants after which a motion counts as settled. Chosen: e^-12 is 6e-6."""
 _STEP_RAD = 0.4  # rotation of the amplitude relative to its steady state within one Runge-Kutta step
-_LEAST_DECAY = 1e-4
+_LEAST_DECAY = 1e-4  # lower bound of the decay rate over the detuning, which bounds the steps of settling; chosen
 
 
 @formerly

@@ -15,7 +15,7 @@ from identification.models.pnlss.fitting.fit import fit_pnlss
 from identification.models.pnlss.fitting.result import FitProgress, FitSettings, PnlssFit
 from identification.models.pnlss.model import PnlssModel
 
-STARTS = 4
+STARTS = 4  # random starts that are compared; chosen
 _ROUNDS = (10, 30)
 """Numbers of iterations, counted from the beginning, after which only the better half of the starts continues."""
 

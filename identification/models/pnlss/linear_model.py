@@ -23,7 +23,7 @@ _FIRST_ITERATIONS = 20
 """Number of iterations for every candidate; the fit continues with the best."""
 _EDGE = 1.0 - 1e-6
 """Largest magnitude of an eigenvalue after reflection."""
-_HARDLY = 2e-3
+_HARDLY = 2e-3  # contribution of a state that hardly counts, over the largest; chosen: true modes had 0.01 and more
 _DEPENDENT = 1e-12
 """Relative variance of a combination of states below which the inputs do not excite it."""
 

@@ -24,7 +24,7 @@ from identification.experiments.experiment import Experiment, same_data
 
 MIXED = "mixed"
 """Name of the training set that holds all levels."""
-_FEWEST = 3
+_FEWEST = 3  # realisations of a level: one to fit, one to choose the iterate, one to test
 
 Fit = TypeVar("Fit")
 

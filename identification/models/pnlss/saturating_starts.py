@@ -106,7 +106,7 @@ def _states(a: Float, b: Float, u: Float) -> Float:
 
 _MOBILITIES = (1e-2, 1e-1, 1e-3)
 """Of the disturbances; starts take turns."""
-_PROPOSALS = 12
+_PROPOSALS = 12  # random starts drawn at least, of which the best are fitted; chosen
 _POOL = 300
 """Directions from which each start takes its features."""
 _STEEP = (0.3, 1.0)

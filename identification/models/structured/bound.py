@@ -32,7 +32,7 @@ from vibrolock.arrays import Float
 
 _EPS = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
 """Tried values of eps, relative to the smallest damping."""
-_THETA = (0.3, 0.5, 0.7)
+_THETA = (0.3, 0.5, 0.7)  # tried values of theta; chosen
 _SLOPES = (0.0, 0.5, 0.9, 0.99)
 """Tried values of s, relative to the smallest slope of the springs beyond their reach."""
 _FAR = np.linspace(-10.0, 10.0, 4001)

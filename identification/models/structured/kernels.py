@@ -13,7 +13,7 @@ import numpy as np
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 NEAR = 1e-3  # of the reach: over shorter ways the mean force is that of two Gauss points, which is exact to rounding
-GAUSS = 0.5 - 0.5 / math.sqrt(3.0)
+GAUSS = 0.5 - 0.5 / math.sqrt(3.0)  # place of the first of two Gauss points on the unit interval
 
 
 @inner_kernel

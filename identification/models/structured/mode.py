@@ -28,7 +28,7 @@ _TRIES = 12
 """Doublings of the force until an element moves as far as in the training data."""
 _REACHED = 0.8
 """Share of the training range below which a backbone that ends for another reason counts as cut off."""
-_CORRECTIONS, _EXACT = 8, 1e-9
+_CORRECTIONS, _EXACT = 8, 1e-9  # most Newton corrections, and the relative change at which they end; chosen
 
 
 def structured_mode(

@@ -17,7 +17,7 @@ _NEAR = float(np.log(2.0))
 """Logarithm of the factor within which a frequency stays."""
 _VECTOR = 4
 """Compiled loops over columns take so many at once, or multiples; those that are left they take one by one."""
-_LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
+_LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5  # bounds of fitted damping ratios; chosen
 
 
 @dataclass(frozen=True, eq=False)

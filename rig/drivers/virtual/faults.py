@@ -26,13 +26,13 @@ LONGEST_PERIOD = 16384
 """Longest period of outputs, samples, with which the virtual device goes on; beyond, outputs are held."""
 V_PER_COUNT = 2.0**-20  # V; counts in which late outputs are continued; chosen: a microvolt, below any converter
 
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)  # increment of SplitMix64 (Steele, Lea & Flood 2014)
 _HELD, _LOST, _LATE = (
     0x48454C44,
     0x4C4F5354,
     0x4C415445,
 )  # separate the draws of the faults from each other and from the noise
-_HIT_HELD, _HIT_LOST, _HIT_LATE = range(3)
+_HIT_HELD, _HIT_LOST, _HIT_LATE = range(3)  # places in the arrays by kind of fault
 
 
 class PassingFaults(Configured, Described):

@@ -19,7 +19,7 @@ from rig.tick.layout import ROW, TickArrays
 
 CHUNK_S = 0.02  # of telemetry that is handed over at a time; chosen
 ALIGNMENT = 64  # bytes: a cache line
-STOP, TAKEN, PUBLISHED, RELEASE_START, START_JUDGED = range(5)
+STOP, TAKEN, PUBLISHED, RELEASE_START, START_JUDGED = range(5)  # places of the control words
 CONTROL_WORDS = 8  # of eight bytes before the histograms; five are used
 TIMES = ("wake_up", "execution", "response")
 """Times counted for every block: delay of the block's start, duration, and the sum of both."""

@@ -13,8 +13,8 @@ from rig.results.predictions.sweeps_figure import draw_sweeps, sweeps_shown
 
 _MOST_NAMED = 12
 """Largest number of names in a legend; chosen for legibility."""
-_NEAR = 1.3
-_MARGIN = 0.15
+_NEAR = 1.3  # the limit of the identified amplitudes is drawn up to this multiple of the top; chosen
+_MARGIN = 0.15  # empty part on either side of the measured frequencies, over their span; chosen
 _MARKED = {"mfc": "white", "mec": "black", "mew": 0.8, "ls": "none"}
 """Looks of measured points: not of the colour of any curve."""
 

@@ -9,7 +9,7 @@ from identification.models import as_recorded
 from rig.drawing.areas import broad
 from rig.drawing.style import MAIN, REJECTED, SECOND, Figure, length_factor
 
-_MOST_SWEEPS, _MOST_ON_A_COLUMN, _MOST_BESIDE_OTHERS = 4, 2, 1
+_MOST_SWEEPS, _MOST_ON_A_COLUMN, _MOST_BESIDE_OTHERS = 4, 2, 1  # largest numbers of sweeps drawn; chosen
 _LINES_OF_TEXT = 14.0  # a row of panels takes the height of so many
 _MOST_SHOWN = 2.0  # times the largest recorded value: an unbounded run is not shown beyond
 

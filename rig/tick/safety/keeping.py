@@ -22,9 +22,7 @@ from vibrolock.compiled import Record, kernel
 FAR = 3.0  # times its level; the build-up of a vibration does not take a force as large as this
 FAR_PERIODS = 2  # in a row that trip; chosen: one may be a ramp that overshoots
 ARRIVED = 1.5  # times a lower level; what is held has reached it below
-SHAKEN_PERIODS = (
-    10  # after a lock in which a level still counts: an amplifier that jumps in a ramp shakes the lock off at once
-)
+SHAKEN_PERIODS = 10  # after a lock in which a level still counts: an amplifier that jumps in a ramp ends the lock
 MOVES_MORE = 1.5  # times the motion that the last check foretells; from there on the force counts, too
 AT_RESONANCE = 0.9  # sine of the lag from which on the last check foretells force and motion
 

@@ -25,15 +25,11 @@ IN_ORDER = 0.9  # of its level; a held quantity above it follows
 SAGGED = 0.75  # of its level; a force may sag to it while the vibration builds up
 TOO_MUCH = 1.5  # times its level; a law that raises its output above it does not hold the quantity that it reads
 GROWN = 1.1  # times its reference; a quantity that has grown so much follows, even if far from its level
-JUMPED = (
-    1.3  # growth of the vibration over the rise of the output from which a force may fall: a jump past a turning point
-)
+JUMPED = 1.3  # growth of vibration over rise of output from which a force may fall: a jump past a turning point
 VANISHED = 0.15  # of its level; a jump past a turning point leaves more force than this
 VISIBLE = 8.0  # times the smallest amplitude whose phase can be read: about three bits of the converter
 SILENT_PERIODS = 40  # that trip; chosen
-UNLIKE = (
-    0.6  # deviation of sent from needed output, over the largest of the output sent and the terms of the known exciter
-)
+UNLIKE = 0.6  # deviation of sent from needed output, over the largest of the output and the terms of the exciter
 TOO_STRONG = 4.0  # needed over sent output; shows an amplifier of another gain, even while the vibration grows
 WIDE = 3.0  # times its band; within it the known exciter can still show an amplifier of another gain
 DOUBTED = 3.0  # standard errors of the exciter that are left to it

@@ -11,9 +11,7 @@ from vibrolock.compiled import Record, kernel
 
 SATURATED_PERIODS = 20  # in a row at the voltage limit after which a level is out of reach; chosen
 CLAMPED_PERIODS = 20  # in a row at an end of the window after which there is no lock; chosen
-FAR_PERIODS = (
-    100  # longer than a lightly damped mode decays; a lock that swings at constant voltage comes near within that
-)
+FAR_PERIODS = 100  # longer than a lightly damped mode decays; a lock that swings at constant voltage is near by then
 LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
 
 SETTLE_RULE = record(f8="phase_rad amplitude", i8="average_periods settled_periods")

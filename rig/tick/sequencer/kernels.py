@@ -21,9 +21,7 @@ from rig.tick.sequencer.repetition import measure_again, note_result, step_is_ov
 from vibrolock.compiled import Record, kernel
 
 LONGEST_WAIT = 200.0  # periods of a ramp that waits for the phase; a loop that hunts at a level hunts more at the next
-LONGEST_WAIT_FOR_HARMONICS = (
-    300.0  # periods beyond its own that the start goes on until the harmonics loop has done its work
-)
+LONGEST_WAIT_FOR_HARMONICS = 300.0  # periods beyond its own that the start waits for the harmonics loop; chosen
 RETURN_PERIODS = 20.0  # of the way back to the last level with a lock
 FIRST_PERIODS = 0.01  # of a record, from which on its length in samples is foretold
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels

@@ -30,8 +30,8 @@ FD_WRAP = 256  # sequence numbers of CAN FD: one byte
 CLASSICAL_SAMPLES = 64  # identifiers of samples: 6 bits
 FD_PARTS = 8  # frames of a row, at most; chosen
 CLASSICAL_PARTS = 4  # frames of a row, at most; chosen: 16 sequence numbers are left
-CHANNELS_A_FRAME = OUTPUTS_A_FRAME = {True: 31, False: 4}
-HEADER = {True: 2, False: 0}
+CHANNELS_A_FRAME = OUTPUTS_A_FRAME = {True: 31, False: 4}  # int16 in a frame, of CAN FD (64 bytes) or classical (8)
+HEADER = {True: 2, False: 0}  # bytes: sequence and flags, of CAN FD or classical
 FD_ROWS = 31  # int16 in a frame of 64 bytes behind the header
 
 
@@ -132,7 +132,7 @@ _FORMATS = (
     '\nBA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG",'
     + '"reserved",' * 10
     + '"StandardCAN_FD","ExtendedCAN_FD";\nBA_DEF_DEF_ "VFrameFormat" "StandardCAN";\n'
-)
+)  # attribute of a DBC file that marks frames of CAN FD
 
 
 def _unsigned(**bits: int) -> list[tuple[str, int, bool]]:

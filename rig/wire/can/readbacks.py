@@ -8,7 +8,7 @@ COUNT = np.dtype("<i2")
 """A count in a frame."""
 INDEX_SIZE = 2  # bytes
 INDICES = 1 << 16  # a frame has 16 bits for the index of a count
-COUNTS_A_FRAME = {True: 31, False: 3}
+COUNTS_A_FRAME = {True: 31, False: 3}  # int16 behind the index, of CAN FD (64 bytes) or classical (8)
 CLASSICAL_SIZE = INDEX_SIZE + 2 * COUNTS_A_FRAME[False]  # bytes of every classical frame
 
 

@@ -12,6 +12,7 @@ from rig.wire.can.frames import FD_LENGTHS, BusTiming, Frame
 
 LONGEST_LINE = 2 + 8 + 128  # characters: type and length, identifier of 29 bits, 64 bytes
 BIT_RATES = {10_000: 0, 20_000: 1, 50_000: 2, 100_000: 3, 125_000: 4, 250_000: 5, 500_000: 6, 750_000: 7, 1_000_000: 8}
+"""Number of slcan's command for each bit rate, bit/s."""
 DATA_BIT_RATES = (1_000_000, 2_000_000, 4_000_000, 5_000_000, 8_000_000)  # bit/s that slcan has commands for
 _CODES = {length: f"{code:X}" for code, length in enumerate(FD_LENGTHS)}
 _KINDS = {ord("t"): (False, False), ord("T"): (False, True)} | {

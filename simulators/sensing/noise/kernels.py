@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from vibrolock.compiled import inner_kernel, kernel
 
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-_MIX_2 = np.uint64(0x94D049BB133111EB)
-_30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
-_LAYER = np.uint64(255)
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)  # increment of SplitMix64 (Steele, Lea & Flood 2014)
+_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)  # first multiplier of its output function
+_MIX_2 = np.uint64(0x94D049BB133111EB)  # second multiplier
+_30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)  # its shifts, bits; the last leaves 53
+_LAYER = np.uint64(255)  # mask of the bits that choose one of the layers
 
-LAYERS = 256
+LAYERS = 256  # of the ziggurat, as in Marsaglia & Tsang (2000)
 TAIL = 3.6541528853610088
 """Start of the tail, chosen so that all layers have the same area and the last layer ends at the maximum of the density."""
 

@@ -15,7 +15,7 @@ Derivatives = Literal["parameters", "state", "all"]
 
 _BYTES = 2_000_000
 """Size of the derivatives of a block: few enough to stay in the cache between the recursions and the products."""
-_FEWEST, _MOST = 16, 1024
+_FEWEST, _MOST = 16, 1024  # limits of a block, samples; chosen
 _EVEN = 4
 """Widths of factors of products are multiples of this: linear algebra loses a quarter of its speed on odd ones."""
 
@@ -149,7 +149,7 @@ PRIOR = 1e-6
 
 It matters only for unobservable states.
 """
-_ITERATIONS = 20
+_ITERATIONS = 20  # most Levenberg-Marquardt iterations for an initial state; chosen
 
 
 def fitted_initial_state(system: System, record: Record, weights: Float, samples: int = SAMPLES) -> Float:
