@@ -1,5 +1,6 @@
 """Time data of others, as arrays of any layout, become records."""
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,12 @@ NEARLY_ONE = 1.0 + 1e-3 * np.arange(PERIODS)[:, None]  # every period of the for
 FORCE = RANDOM.normal(size=(LEVELS, REALISATIONS, 1, SIZE)) * NEARLY_ONE * np.array([1.0, 3.0])[:, None, None, None]
 MOTION = RANDOM.normal(size=(LEVELS, REALISATIONS, PERIODS, SIZE))
 AXES = ("level", "realisation", "period", "sample")
+
+
+@pytest.fixture(autouse=True)
+def draws_of_its_own(monkeypatch):
+    """Each test draws the same numbers, whatever has run before it."""
+    monkeypatch.setattr(sys.modules[__name__], "RANDOM", np.random.default_rng(12))
 
 
 def told(force: dict[str, Any] | None = None, motion: dict[str, Any] | None = None, **more: Any) -> TimeDataMapping:

@@ -37,7 +37,7 @@ def reference(curve, at_hz, *, upper):
 
 def test_above_the_fold_the_measurement_chooses_and_a_note_says_so(curve):
     asked = reference(curve, np.linspace(25.2, 26.6, 8), upper=True)
-    predicted, _, error = compared(oscillator(), {"exciter": None}, asked)
+    predicted, _, error, _ = compared(oscillator(), {"exciter": None}, asked)
     np.testing.assert_allclose(predicted.amplitude_m(), asked.measured.amplitude_m, rtol=0.02)
     between = int(np.count_nonzero(asked.measured.frequency_hz > curve.fold_frequency_hz[1]))
     assert any(note.startswith(f"at {between} of 8 points {CHOSEN}") for note in error.notes)
@@ -45,6 +45,6 @@ def test_above_the_fold_the_measurement_chooses_and_a_note_says_so(curve):
 
 def test_where_rest_leads_nothing_is_chosen(curve):
     asked = reference(curve, np.linspace(27.4, 26.8, 4), upper=False)
-    predicted, _, error = compared(oscillator(), {"exciter": None}, asked)
+    predicted, _, error, _ = compared(oscillator(), {"exciter": None}, asked)
     np.testing.assert_allclose(predicted.amplitude_m(), asked.measured.amplitude_m, rtol=0.02)
     assert not any(CHOSEN in note for note in error.notes)

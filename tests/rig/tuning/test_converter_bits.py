@@ -1,6 +1,7 @@
 """Rounding in the converters, as a force away from the frequency of the output."""
 
 import math
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,12 @@ from rig.tuning.converter_bits import bits_force_n, periodic_beyond, rounding
 from tests.rig.rigs import bench_with
 
 RNG = np.random.default_rng(4)
+
+
+@pytest.fixture(autouse=True)
+def draws_of_its_own(monkeypatch):
+    """Each test draws the same numbers, whatever has run before it."""
+    monkeypatch.setattr(sys.modules[__name__], "RNG", np.random.default_rng(4))
 
 
 def test_rounding_a_sine_of_many_bits_errs_by_a_bit_over_the_root_of_twelve():

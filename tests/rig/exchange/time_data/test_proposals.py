@@ -1,5 +1,6 @@
 """Guesses of a proposed mapping: periods, transients, roles, channels in a matrix, the parts that are not told."""
 
+import sys
 import tomllib
 
 import h5py
@@ -13,6 +14,12 @@ from rig.exchange.proposal.proposal import proposed_mapping
 from tests.refused import refused
 
 RANDOM = np.random.default_rng(4)
+
+
+@pytest.fixture(autouse=True)
+def draws_of_its_own(monkeypatch):
+    """Each test draws the same numbers, whatever has run before it."""
+    monkeypatch.setattr(sys.modules[__name__], "RANDOM", np.random.default_rng(4))
 
 
 @pytest.mark.parametrize(("period", "count"), [(100, 5), (333, 3), (512, 2), (64, 40)])
