@@ -198,7 +198,6 @@ def _site_entries(app: Sphinx) -> Iterator[tuple[Entry, str]]:
 
 
 def _write_words(app: Sphinx, error: Exception | None) -> None:
-    """Write the list of words beside the pages."""
     if error is None and app.builder.name == "html":
         write_words(words_of(_site_entries(app)), Path(app.outdir))
 

@@ -12,7 +12,7 @@ from rig.analysis.subject import Subject
 from rig.drawing.areas import areas, is_narrow
 from rig.drawing.style import COLOURS, MAIN, SECOND, Figure, SubFigure
 from rig.errors import ConfigurationError
-from rig.text.console import number, print_table
+from rig.text.console import print_columns
 from simulators.analysis import (
     HysteresisLoop,
     NotConvergedError,
@@ -57,21 +57,16 @@ class Backbone(Study):
     def print_tables(self) -> None:
         """Print one line per level, in the form of a measured backbone."""
         r = self.responses
-        ratios = [r.force_harmonic_ratio(h) if h < r.force_harmonics_n.shape[1] else None for h in (2, 3)]
-        print_table(
-            ("force N", "voltage V", "frequency Hz", "damping %", "all harmonics %", "amplitude mm", "F2/F1", "F3/F1"),
-            [
-                (
-                    number(r.force_n[k], ".4f"),
-                    number(r.voltage_v[k], ".4f"),
-                    number(r.frequency_hz[k], ".4f"),
-                    number(r.damping_ratio[k], ".4f", 100.0),
-                    number(r.damping_ratio_total_power[k], ".4f", 100.0),
-                    number(r.amplitude_m[k], ".5f", 1e3),
-                    *(number(None if ratio is None else ratio[k], ".3f") for ratio in ratios),
-                )
-                for k in range(r.frequency_hz.size)
-            ],
+        unknown = [None] * r.frequency_hz.size
+        ratios = [r.force_harmonic_ratio(h) if h < r.force_harmonics_n.shape[1] else unknown for h in (2, 3)]
+        print_columns(
+            ("force N", ".4f", r.force_n),
+            ("voltage V", ".4f", r.voltage_v),
+            ("frequency Hz", ".4f", r.frequency_hz),
+            ("damping %", ".4f", 100.0 * r.damping_ratio),
+            ("all harmonics %", ".4f", 100.0 * r.damping_ratio_total_power),
+            ("amplitude mm", ".5f", 1e3 * r.amplitude_m),
+            *((f"F{h}/F1", ".3f", ratio) for h, ratio in zip((2, 3), ratios, strict=True)),
         )
         print(f"modal frequency, largest amplitude over smallest: {100.0 * r.frequency_shift:+.2f} %")
         for point, loops in self.loops.items():

@@ -13,7 +13,8 @@ from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, Figure
 from rig.errors import ConfigurationError
-from rig.text.console import number, print_table
+from rig.text.column import Column
+from rig.text.console import print_rows
 from simulators.analysis import NotConvergedError, PeriodicResponses
 from vibrolock.arrays import Float
 
@@ -87,22 +88,18 @@ class Forced(Study):
         rows = []
         for name, one in (("up", self.up), ("down", self.down)):
             extremes = ForceExtremes.of(one)
-            k = int(np.argmax(one.amplitude_m))
-            rows.append(
-                (
-                    name,
-                    number(extremes.at_first_n, ".4f"),
-                    number(extremes.lowest_n, ".4f"),
-                    number(extremes.lowest_hz, ".4f"),
-                    number(extremes.lowest_share, ".2f", 100.0),
-                    number(extremes.highest_share, ".3f"),
-                    number(extremes.highest_hz, ".4f"),
-                    number(one.amplitude_m[k], ".5f", 1e3),
-                )
-            )
-        low = self.up.frequency_hz[0]
-        headings = (f"force at {low:.4g} Hz, N", "lowest N", "at Hz", "% of the first", "highest over first", "at Hz")
-        print_table(("direction", *headings, "largest mm"), rows)
+            rows.append({"direction": name, **vars(extremes), "largest_m": np.max(one.amplitude_m)})
+        print_rows(
+            rows,
+            Column("direction", "direction"),
+            Column("at_first_n", f"force at {self.up.frequency_hz[0]:.4g} Hz, N", pattern=".4f"),
+            Column("lowest_n", "lowest N", pattern=".4f"),
+            Column("lowest_hz", "at Hz", pattern=".4f"),
+            Column("lowest_share", "% of the first", pattern=".2f", scale=100.0),
+            Column("highest_share", "highest over first", pattern=".3f"),
+            Column("highest_hz", "at Hz", pattern=".4f"),
+            Column("largest_m", "largest mm", pattern=".5f", scale=1e3),
+        )
         if not self.complete:
             return
         if self.differ_hz.size:

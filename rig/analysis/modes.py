@@ -8,7 +8,7 @@ from rig.analysis.study import Study
 from rig.analysis.subject import Subject
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MAIN, REJECTED, Axes, Figure
-from rig.text.console import number, print_table
+from rig.text.console import print_columns
 from simulators import VirtualRig
 from simulators.analysis import LinearModes
 from simulators.parts import MeshedBeam
@@ -55,26 +55,19 @@ class Modes(Study):
         """Print one line per mode."""
         modes, channels = self.structure, self.channel_shapes
         print("structure: elements at their linear stiffness, joints stuck; shapes in kg^-1/2 at the channels")
-        print_table(
-            ("mode", "frequency Hz", "damping %", "drive point", *channels),
-            [
-                (
-                    f"{'*' if k == self.subject.mode else ''}{k + 1}",
-                    number(modes.frequency_hz[k], ".4f"),
-                    number(modes.damping_ratio[k], ".4f", 100.0),
-                    number(modes.drive_shape[k], ".6f"),
-                    *(number(shape[k], ".6f") for shape in channels.values()),
-                )
-                for k in range(modes.frequency_hz.size)
-            ],
+        numbers = [f"{'*' if k == self.subject.mode else ''}{k + 1}" for k in range(modes.frequency_hz.size)]
+        print_columns(
+            ("mode", "", numbers),
+            ("frequency Hz", ".4f", modes.frequency_hz),
+            ("damping %", ".4f", 100.0 * modes.damping_ratio),
+            ("drive point", ".6f", modes.drive_shape),
+            *((name, ".6f", shape) for name, shape in channels.items()),
         )
         print("* the mode under test\ncoupled rig from the voltage: structure, stinger and exciter")
-        print_table(
-            ("mode", "frequency Hz", "damping %"),
-            [
-                (f"{k + 1}", number(frequency_hz, ".4f"), number(self.coupled.damping_ratio[k], ".4f", 100.0))
-                for k, frequency_hz in enumerate(self.coupled.frequency_hz)
-            ],
+        print_columns(
+            ("mode", ".0f", range(1, self.coupled.frequency_hz.size + 1)),
+            ("frequency Hz", ".4f", self.coupled.frequency_hz),
+            ("damping %", ".4f", 100.0 * self.coupled.damping_ratio),
         )
 
     def draw_on(self, page: Figure) -> None:

@@ -115,9 +115,6 @@ def seen_in(bench: Bench, recorded: Recording) -> Seen:
     rows = recorded.parts[-1].read(at.first_sample, at.end_sample)
     lowest_hz = max(BAND[0] * bench.specimen.linear_frequency_hz, bench.limits.frequency_hz[0])
 
-    def farthest_m(_: str, acceleration_m_s2: float) -> float:
-        """Return the displacement if all of the acceleration were at the lowest frequency."""
-        return acceleration_m_s2 / (2.0 * math.pi * lowest_hz) ** 2
-
+    lowest_rad_s = 2.0 * math.pi * lowest_hz  # all of the acceleration may be at this frequency
     enough = bool(((coherence >= ENOUGH) | hopeless).all())
-    return Seen(enough, share_of_limits(bench, rows, farthest_m))
+    return Seen(enough, share_of_limits(bench, rows, lambda _, acceleration_m_s2: acceleration_m_s2 / lowest_rad_s**2))

@@ -41,3 +41,12 @@ def widen(axis: Axes, least: float) -> None:
     middle = 0.5 * (low + high)
     half = max(0.5 * (high - low), 0.5 * least * abs(middle))
     axis.set_ylim(middle - half, middle + half)
+
+
+def ticks_at_1_2_5(axis: Axes) -> None:
+    """Label a logarithmic x axis with plain numbers, at 1, 2 and 5 of each decade."""
+    from matplotlib.ticker import LogLocator
+
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")

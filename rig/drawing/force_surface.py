@@ -7,6 +7,7 @@ import numpy as np
 
 from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
 from identification.common import LevelFit
+from rig.drawing.axes import ticks_at_1_2_5
 from rig.drawing.page import grid
 from rig.drawing.steady_curve import UNSTABLE, draw_stability
 from rig.drawing.style import COLOURS, REJECTED, Axes, Figure, legend_above, length_factor, plain_log, shade, title
@@ -112,8 +113,6 @@ def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
 
 
 def _sections(axis: Axes, surface: ForceSurface, scale: float, unit: str) -> None:
-    from matplotlib.ticker import LogLocator
-
     for lag, marker, colour in zip(_SECTIONS_DEG, ("v", "o", "^"), COLOURS, strict=False):
         try:
             section = surface.at_lag(lag)
@@ -122,7 +121,5 @@ def _sections(axis: Axes, surface: ForceSurface, scale: float, unit: str) -> Non
         axis.plot(scale * section.amplitude_m, section.force_n, marker + "-", color=colour, label=f"lag {lag:g} deg")
     axis.set(xlabel=f"displacement, {unit}", ylabel="force, N", xscale="log", yscale="log")
     plain_log(axis)
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter("{x:g}")
-    axis.xaxis.set_minor_formatter("")
+    ticks_at_1_2_5(axis)
     axis.legend()

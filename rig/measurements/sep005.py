@@ -36,11 +36,10 @@ def time_series(
     samples are NaN. Raises `RecordingError` for a column, part or point that there is not.
     """
     wanted = [*(str(channel["name"]) for channel in recording.channels), VOLTAGE] if columns is None else columns
-    number, samples, found = selected_rows(recording, columns=wanted, part=part, point=point, from_s=from_s, to_s=to_s)
+    number, samples, found = selected_rows(recording, wanted, part, point, from_s, to_s)
     rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])
-    facts: dict[str, Any] = {
-        "group": f"{recording.kind}, part {number}" + ("" if point is None else f", point {point}")
-    }
+    of_a_point = "" if point is None else f", point {point}"
+    facts: dict[str, Any] = {"group": f"{recording.kind}, part {number}{of_a_point}"}
     steps = np.unique(np.diff(samples))
     facts |= {"fs": rate_hz / float(steps[0])} if steps.size == 1 else {"time": (samples / rate_hz).tolist()}
     if number == 1 and samples.size:

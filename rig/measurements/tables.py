@@ -99,9 +99,7 @@ def telemetry(
         import xarray
     except ImportError:
         raise _missing("xarray") from None
-    number, samples, found = selected_rows(
-        recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every
-    )
+    number, samples, found = selected_rows(recording, columns, part, point, from_s, to_s, every)
     rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])
     variables = {name: ("time", values, attributes) for name, values, attributes in found}
     coordinate = ("time", samples / rate_hz, {"units": "s", "long_name": "time from the beginning of the part"})
@@ -111,12 +109,11 @@ def telemetry(
 
 def selected_rows(
     recording: Recording,
-    *,
-    columns: Sequence[str] | None = None,
-    part: int | None = None,
-    point: int | None = None,
-    from_s: float | None = None,
-    to_s: float | None = None,
+    columns: Sequence[str] | None,
+    part: int | None,
+    point: int | None,
+    from_s: float | None,
+    to_s: float | None,
     every: int = 1,
 ) -> tuple[int, np.ndarray, list[tuple[str, np.ndarray, dict[str, str]]]]:
     """Return the number of the part, the samples of the rows from its beginning, and name, values and attributes.

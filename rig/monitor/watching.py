@@ -98,7 +98,6 @@ def _replay(view: "View") -> "ReplayState | None":
 
 
 def _goes_on(view: "View") -> bool:
-    """Return whether there is more to come."""
     replay = _replay(view)
     return view.connected if replay is None else replay.time_s < replay.duration_s
 

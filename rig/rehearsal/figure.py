@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rig.drawing.axes import ticks_at_1_2_5
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, say_why_empty, title
 from rig.rehearsal.rehearsal import Rehearsal
@@ -32,8 +33,6 @@ def draw_rehearsal(page: Figure, rehearsal: Rehearsal) -> None:
 
 
 def _draw_backbones(frequency: Axes, damping: Axes, rehearsal: Rehearsal) -> None:
-    from matplotlib.ticker import LogLocator
-
     for draw in rehearsal.draws:
         points = [p for p in draw.trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
         if not points:
@@ -52,9 +51,7 @@ def _draw_backbones(frequency: Axes, damping: Axes, rehearsal: Rehearsal) -> Non
     for colour, label in ((MAIN, "ends well"), (REJECTED, "points missing"), (SECOND, "trips")):
         frequency.plot([], [], color=colour, label=label)
     for axis in (frequency, damping):
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.xaxis.set_major_formatter("{x:g}")
-        axis.xaxis.set_minor_formatter("")
+        ticks_at_1_2_5(axis)
     frequency.legend()
     frequency.set(xlabel="displacement, mm", ylabel="modal frequency, Hz")
     damping.set(xlabel="displacement, mm", ylabel="modal damping, %")

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -117,18 +118,8 @@ def _panel(axis: Axes, one: _Compared, n: int, x: Column, y: Column, spread: Col
     colour, marker = COLOURS[n % len(COLOURS)], MARKERS[n % len(MARKERS)]
     used = [point for point in one.points if point.accepted]
     errors = None if spread is None else _values(used, spread)
-    axis.errorbar(
-        _values(used, x),
-        _values(used, y),
-        errors,
-        fmt=marker,
-        ms=4.5,
-        mfc="none" if n else colour,
-        color=colour,
-        capsize=2,
-        elinewidth=0.9,
-        label=one.name,
-    )
+    look: dict[str, Any] = {"fmt": marker, "ms": 4.5, "mfc": "none" if n else colour, "capsize": 2, "elinewidth": 0.9}
+    axis.errorbar(_values(used, x), _values(used, y), errors, color=colour, label=one.name, **look)
     refused = [point for point in one.points if not point.accepted]
     axis.plot(_values(refused, x), _values(refused, y), marker, ms=3, mfc="none", color=REJECTED)
 

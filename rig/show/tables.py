@@ -59,14 +59,10 @@ def _counted(counters: Mapping[str, int]) -> list[str]:
         if count and name == CONTINUED:
             out.append(f"note: outputs came too late in {count} samples; the device went on with the vibration")
         elif count and name not in order:
-            out.append(f"warning: {name.replace('_', ' ')}: {count}{_unit(name)}")
+            unit = "" if name.endswith(_OWN_UNITS) else " samples"
+            out.append(f"warning: {name.replace('_', ' ')}: {count}{unit}")
     disorder = disorder_text(counters)
     return [*out, f"warning: {disorder}"] if disorder else out
-
-
-def _unit(name: str) -> str:
-    """Return the unit of a counter: its name says it, or it counts samples."""
-    return "" if name.endswith(_OWN_UNITS) else " samples"
 
 
 def _pace(loop: Mapping[str, Any]) -> str:

@@ -69,21 +69,20 @@ def number(value: float | None, pattern: str, scale: float = 1.0) -> str:
     return "-" if value is None or value != value else format(scale * value, pattern)
 
 
-def print_columns(*columns: tuple[str, str, Iterable[float | None]]) -> None:
-    """Print a table from heading, format and values of each column; values that are not numbers are dashes."""
-    cells = [[number(value, pattern) for value in values] for _, pattern, values in columns]
+def print_columns(*columns: tuple[str, str, Iterable[Any]]) -> None:
+    """Print a table from heading, format and values of each column: text without a format, dashes for None and NaN."""
+    cells = [[number(value, pattern) if pattern else value for value in values] for _, pattern, values in columns]
     print_table([heading for heading, _, _ in columns], list(zip(*cells, strict=True)))
 
 
 def print_rows(rows: Sequence[Mapping[str, Any]], *columns: Column) -> None:
     """Print a table of fields of the rows; those of columns without a format are text."""
-    print_table(
-        [column.title for column in columns],
-        [
-            [number(row[one.key], one.pattern, one.scale) if one.pattern else str(row[one.key]) for one in columns]
-            for row in rows
-        ],
-    )
+    print_table([column.title for column in columns], [cells_of(row, columns) for row in rows])
+
+
+def cells_of(row: Mapping[str, Any], columns: Iterable[Column]) -> list[str]:
+    """Return the fields of a row as text; those of columns without a format as they are."""
+    return [number(row[one.key], one.pattern, one.scale) if one.pattern else str(row[one.key]) for one in columns]
 
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.tuning import Design
+from rig.drawing.lines import without_wraps
 from rig.drawing.page import check_ending, grid, page_for
 from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, say_why_empty, title, unit_text
 from rig.errors import RecordingError
-from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from rig.tuning import Tuning
@@ -64,7 +64,7 @@ def _draw_plant(size: Axes, phase: Axes, tuning: "Tuning") -> None:
         for axis, values in ((size, np.abs(value)), (phase, np.degrees(np.angle(value)))):
             axis.plot(measured.frequency_hz, values, color=colour, ls="none", marker=".", mew=0.0, alpha=0.4)
         size.semilogy(fine, np.abs(model), color=colour, label=label)
-        phase.plot(fine, _unbroken(np.degrees(np.angle(model))), color=colour)
+        phase.plot(fine, without_wraps(np.degrees(np.angle(model))), color=colour)
         noise = measured.noise_std[:, row, 0]
         seen.plot(measured.frequency_hz, 1.0 / (1.0 + (noise / np.abs(value)) ** 2), color=colour, lw=0.9)
     size.plot([], [], color=REJECTED, label="measured", ls="none", marker=".", mew=0.0, alpha=0.4)
@@ -95,7 +95,7 @@ def _draw_bode(size: Axes, phase: Axes, design: Design) -> None:
         margin = f"{20.0 * math.log10(found.gain_margin):.0f} dB" if math.isfinite(found.gain_margin) else "any gain"
         label = f"{name}: {margin}, {found.phase_margin_deg:.0f} deg" if name else None
         size.loglog(f, np.abs(gain), line, color=colour, label=label)
-        phase.semilogx(f, _unbroken(np.degrees(np.angle(gain))), line, color=colour)
+        phase.semilogx(f, without_wraps(np.degrees(np.angle(gain))), line, color=colour)
         if name and found.crossover_rad_s > 0.0:
             for axis in (size, phase):
                 axis.axvline(found.crossover_rad_s / 2.0 / np.pi, color=colour, lw=0.8, ls=":")
@@ -137,10 +137,3 @@ def _legend_above(axis: Axes, columns: int = 1, title: str | None = None) -> Non
     axis.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2, title=title, alignment="left"
     )
-
-
-def _unbroken(degrees: Float) -> Float:
-    """Replace an angle by NaN where it wraps, so that no line is drawn there."""
-    out = degrees.copy()
-    out[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
-    return out

@@ -62,7 +62,8 @@ class LapMesh:
         """Return left node, right node and eccentricity (m) of the arm, or of upper and lower leg, in one element."""
         if self.n_arm <= element < self.n_arm + self.n_lap:
             i = element - self.n_arm
-            return [(leg[i], leg[i + 1], e) for leg, e in zip(self.legs, self._eccentricities, strict=True)]
+            quarter = self.thickness_m / 4.0
+            return [(leg[i], leg[i + 1], e) for leg, e in zip(self.legs, (quarter, -quarter), strict=True)]
         left = element if element < self.n_arm else element + 1 + self.n_lap
         return [(left, left + 1, 0.0)]
 
@@ -97,10 +98,6 @@ class LapMesh:
             row[[3 * left + 2, 3 * right + 2]] -= sign * e * np.array([1.0 - s, s])
             row[bending_dofs(left, right)] += sign * e * hermite(s, size, "slope")
         return row
-
-    @property
-    def _eccentricities(self) -> tuple[float, float]:
-        return self.thickness_m / 4.0, -self.thickness_m / 4.0
 
     def _locate(self, position_m: float, *, inwards: bool = False) -> tuple[int, float, float]:
         """Return the element at a position, the place in it from 0 to 1, and its size (m).

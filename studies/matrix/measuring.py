@@ -167,7 +167,6 @@ def _seen_at_0_v(log: Path) -> float | None:
 
 
 def _here() -> dict[str, str]:
-    """Return when and on what a row is measured."""
     return {"utc": _utc(), "version": vibrolock.__version__, "machine": machine()}
 
 
@@ -184,7 +183,6 @@ def _millivolts(steps_v: dict[str, float]) -> dict[str, float]:
 
 
 def _digits(value: float) -> float:
-    """Return a value with five digits."""
     return float(f"{value:.5g}")
 
 

@@ -167,13 +167,8 @@ def _from_vibrations(run: rig.Run) -> Measured:
     channels = channels_from(run.recording.channels)
     vibrations = [vibration_from(point, channels) for point in points]
     mode = nonlinear_mode(recorded_drive_shape(run.recording, points).backbone(vibrations))
-    return Measured(
-        mode.amplitude_m,
-        mode.modal_frequency_hz,
-        mode.damping_ratio,
-        mode.modal_frequency_std_hz,
-        mode.damping_ratio_std,
-    )
+    errors = mode.modal_frequency_std_hz, mode.damping_ratio_std
+    return Measured(mode.amplitude_m, mode.modal_frequency_hz, mode.damping_ratio, *errors)
 
 
 def _from_surface(run: rig.Run) -> Measured:

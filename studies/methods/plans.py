@@ -56,11 +56,9 @@ def plan_of(method: str, rig: str, pure: bool, condition: str, knob: float) -> P
 
 
 def _shipped(rig: str, kind: str) -> Table | None:
-    """Return the shipped plan of a kind for a rig, if there is one."""
-    path = f"{rig}/{kind}"
     if rig not in SHIPPED or (rig == "magnet-beam-symmetric" and kind != "backbone"):
         return None
-    return load_plan(path).model_dump(mode="json", exclude_unset=True)
+    return load_plan(f"{rig}/{kind}").model_dump(mode="json", exclude_unset=True)
 
 
 def _common(rig: str, kind: str, pure: bool, known: Table) -> Table:

@@ -12,7 +12,8 @@ from rig.report.document import Block, Chapter, Facts, Picture, Section, Table, 
 from rig.report.facts import table_of_files
 from rig.results.files import understood
 from rig.system.text_files import read_bytes, read_text
-from rig.text.console import number
+from rig.text.column import Column
+from rig.text.console import cells_of, number
 from studies.report.paper import SAME_LEVEL, agreement
 
 _OWN_LEVEL = "same level"
@@ -95,25 +96,27 @@ def _made(study: Mapping[str, Any], table: Mapping[str, Any], levels: int | None
     words += [] if levels is None else ["--levels", str(levels)]
     for part in ("steady", "sweeps"):
         words += [] if table[part] else ["--without", part]
-    rows = [
-        (
-            row["training_set"],
-            str(row["models"]),
-            number(row["seconds_mean"], ".1f"),
-            number(row["seconds_most"], ".1f"),
-            number(row["iterations_mean"], ".0f"),
-            number(row["chosen_mean"], ".0f"),
-        )
-        for row in table["times"]
-    ]
+    fits = _table(
+        "Fits",
+        table["times"],
+        Column("training_set", "trained at"),
+        Column("models", "models"),
+        Column("seconds_mean", "time a model\ns", pattern=".1f"),
+        Column("seconds_most", "longest\ns", pattern=".1f"),
+        Column("iterations_mean", "iterations", pattern=".0f"),
+        Column("chosen_mean", "iterate chosen", pattern=".0f"),
+    )
     facts = [
         ("command", shlex.join(words)),
         ("bench", str(study["bench"]["name"])),
         ("seed", str(study["seed"])),
         ("scatter of modal frequencies", f"{100 * float(study['scatter']):g} %"),
     ]
-    headings = ("trained at", "models", "time a model\ns", "longest\ns", "iterations", "iterate chosen")
-    return [Facts("", facts), Table("Fits", headings, rows)]
+    return [Facts("", facts), fits]
+
+
+def _table(caption: str, rows: Sequence[Mapping[str, Any]], *columns: Column) -> Table:
+    return Table(caption, [column.title for column in columns], [cells_of(row, columns) for row in rows])
 
 
 def _beside_the_paper(specimen: str, own: Sequence[Mapping[str, Any]]) -> list[Block]:
@@ -162,27 +165,26 @@ def _errors(rows: Sequence[Mapping[str, Any]], name: str) -> Table:
 def _steady(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
     if not rows:
         return []
-    body = [
-        (
-            row["training_set"],
-            f"{row['force_n']:g} N" if row["force_n"] is not None else "-",
-            row["held"],
-            number(row["truth_m"], ".4f", 1e3),
-            number(row["peak_m"], ".4f", 1e3),
-            number(row["error"], "+.1f", 100.0),
-            number(row.get("frequency_error"), "+.3f", 100.0),
-            number(row["range_use"], ".2f"),
-        )
-        for row in rows
-    ]
-    headings = ("trained at", "force", "held", "rig\nmm", "model\nmm", "error\n%", "frequency\n%", "range use")
+    body = []
+    for row in rows:
+        force = "-" if row["force_n"] is None else f"{row['force_n']:g} N"
+        body.append({"frequency_error": None, **row, "force": force})
+    peaks = _table(
+        "Peaks of the selected models against the rig's own",
+        body,
+        Column("training_set", "trained at"),
+        Column("force", "force"),
+        Column("held", "held"),
+        Column("truth_m", "rig\nmm", "", ".4f", 1e3),
+        Column("peak_m", "model\nmm", "", ".4f", 1e3),
+        Column("error", "error\n%", "", "+.1f", 100.0),
+        Column("frequency_error", "frequency\n%", "", "+.3f", 100.0),
+        Column("range_use", "range use", "", ".2f"),
+    )
     lost = [
         f"trained at {row['training_set']}, {row['held']}: {row['notes'][-1]}" for row in rows if not row["complete"]
     ]
-    return [
-        Table("Peaks of the selected models against the rig's own", headings, body),
-        *(Text(one, "note") for one in lost),
-    ]
+    return [peaks, *(Text(one, "note") for one in lost)]
 
 
 def _sweeps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
@@ -205,11 +207,9 @@ def _sweeps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
 
 
 def _figures(results: Path) -> list[Block]:
-    found = [(results / name, caption) for name, caption in _FIGURES.items() if (results / name).is_file()]
-    return [
-        Picture(
-            caption,
-            source=f"data:image/png;base64,{b64encode(read_bytes(path, _LARGEST_BYTES, RecordingError)).decode()}",
-        )
-        for path, caption in found
-    ]
+    found: list[Block] = []
+    for name, caption in _FIGURES.items():
+        if (results / name).is_file():
+            picture = b64encode(read_bytes(results / name, _LARGEST_BYTES, RecordingError)).decode()
+            found.append(Picture(caption, source=f"data:image/png;base64,{picture}"))
+    return found

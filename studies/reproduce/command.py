@@ -5,7 +5,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -97,26 +97,10 @@ def reproduce_(
     of = SPECIMENS[specimen]
     if data is not None:
         raise ConfigurationError(f"`data` {data}: is for reference studies, {', '.join(STUDIES)}; leave it out")
-    options = Options(
-        specimen=of,
-        bench=load_bench(of.name if bench is None else bench),
-        folder=output,
-        models=int(models) if models.isdecimal() else models,
-        scatter=scatter,
-        model=model,
-        shifts=shifts,
-        input=input,
-        beside=tuple(beside or ()),
-        saturating=saturating,
-        states=states,
-        realisations=realisations,
-        iterations=iterations,
-        levels=levels,
-        channel=channel,
-        jobs=jobs,
-        seed=seed,
-        without=frozenset(without or ()),
-    )
+    given = {name: value for name, value in context.params.items() if name in Options.__dataclass_fields__}
+    changed: dict[str, Any] = {"models": int(models) if models.isdecimal() else models, "beside": tuple(beside or ())}
+    changed |= {"without": frozenset(without or ()), "specimen": of, "bench": load_bench(bench or of.name)}
+    options = Options(**given | changed, folder=output)
     study = reproduce(options, _say)
     write_tables(study)
     draw_study(study)
@@ -132,7 +116,6 @@ _OF_REFERENCES = ("specimen", "output", "data", "models", "seed", "json")
 def _reference(
     context: typer.Context, name: str, output: Path, data: Path | None, models: str, seed: int, json: bool
 ) -> None:
-    """Run a reference study."""
     from rig.text.console import print_json
     from studies.reproduce.references.data import found
     from studies.reproduce.references.output import prepared, say_reference, summary_of, write_reference

@@ -47,12 +47,9 @@ def _errors(page: "Figure", study: Study) -> None:
     says which levels the study does not have.
     """
     sets = study.table.training_sets
-    shown = (
-        tuple(study.tables)
-        if len(sets) == 1
-        else tuple(name for k, name in enumerate(study.tables) if k == 0 or name == _LINEAR)
-    )
-    tables = {name: study.tables[name] for name in shown if name in study.tables}
+    first = next(iter(study.tables))
+    shown = study.tables if len(sets) == 1 else {first, _LINEAR}
+    tables = {name: table for name, table in study.tables.items() if name in shown}
     axes = grid(page, 1, len(sets))[0]
     tests = [
         test for test in (SAME_LEVEL, *study.table.levels) if any(study.table.cell(one, test).runs for one in sets)
@@ -84,13 +81,8 @@ def _tests(axis: Any, tables: Mapping[str, ErrorTable], training_set: str, tests
             at = column + shift + random.uniform(-0.3, 0.3, errors.size) * (errors.size > 1) / len(tables)
             axis.plot(at, errors, mark, color=colour, alpha=0.6, label=None if column else name)
             if errors.size > 1:
-                axis.plot(
-                    [column + shift - 0.4 / len(tables), column + shift + 0.4 / len(tables)],
-                    2 * [errors.mean()],
-                    color=SECOND,
-                    zorder=3,
-                    label="mean",
-                )
+                ends = [column + shift - 0.4 / len(tables), column + shift + 0.4 / len(tables)]
+                axis.plot(ends, 2 * [errors.mean()], color=SECOND, zorder=3, label="mean")
             elif errors.size:
                 axis.annotate(f"{errors[0]:.3g} %", (column + shift, errors[0]), (0, 6), ha="center", **_POINTS)
             if errors.size < len(rows):
@@ -142,25 +134,19 @@ def _steady(page: "Figure", study: Study) -> None:
 
 
 def _rig(axis: Any, truth: Truth) -> None:
-    """Draw the true responses of the rig."""
     from matplotlib import rcParams
 
-    responses = truth.responses
+    hertz, amplitude_mm = truth.responses.frequency_hz, 1e3 * truth.responses.amplitude_m
     if truth.held == "pure-sine":
-        backbone: dict[str, Any] = {"color": "black", "ls": "--", "label": "rig: backbone"}
-        axis.plot(responses.frequency_hz, 1e3 * responses.amplitude_m, **backbone)
-        axis.plot(
-            truth.frequency_hz, 1e3 * truth.amplitude_m, "k*", ms=2.0 * rcParams["lines.markersize"], label="rig: peak"
-        )
+        axis.plot(hertz, amplitude_mm, "k--", label="rig: backbone")
+        size = 2.0 * rcParams["lines.markersize"]
+        axis.plot(truth.frequency_hz, 1e3 * truth.amplitude_m, "k*", ms=size, label="rig: peak")
     else:
         label = f"rig: {_HELD[truth.held]}"
-        axis.plot(
-            responses.frequency_hz, 1e3 * responses.amplitude_m, color=REJECTED, lw=broad(), alpha=0.5, label=label
-        )
+        axis.plot(hertz, amplitude_mm, color=REJECTED, lw=broad(), alpha=0.5, label=label)
 
 
 def _explain(page: "Figure", axes: np.ndarray, study: Study, *, ends: bool) -> None:
-    """Put one legend on the page."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -207,21 +193,12 @@ def _envelopes(axis: Any, shown: Sequence[SweepResult], colours: Mapping[str, An
         axis.plot(one.frequency_hz, simulated, ls="--" if coupled else "-", color=colour, label=label)
         left = np.flatnonzero(np.isfinite(simulated) & (simulated <= _MOST_OF_UNBOUNDED * top))
         if one.unbounded_at_s is not None and left.size:
-            label = "unbounded from here on"
-            axis.plot(
-                one.frequency_hz[left[-1]],
-                simulated[left[-1]],
-                "X",
-                color=colour,
-                mec="black",
-                ms=1.8 * size,
-                label=label,
-            )
+            look = {"color": colour, "mec": "black", "ms": 1.8 * size, "label": "unbounded from here on"}
+            axis.plot(one.frequency_hz[left[-1]], simulated[left[-1]], "X", **look)
     bounded = [float(np.max(one.simulated)) for one in shown if one.unbounded_at_s is None]
     highest = max([top, *bounded])
-    axis.set_ylim(
-        0.0, 1.15 * min(highest, _MOST_SHOWN * top) if len(bounded) == len(shown) else _MOST_OF_UNBOUNDED * top
-    )
+    all_bounded = len(bounded) == len(shown)
+    axis.set_ylim(0.0, 1.15 * min(highest, _MOST_SHOWN * top) if all_bounded else _MOST_OF_UNBOUNDED * top)
     if highest > _MOST_SHOWN * top:
         axis.text(0.99, 0.95, "cut off above", ha="right", va="top", transform=axis.transAxes)
 

@@ -22,7 +22,6 @@ from identification import (
     linear_modes,
     realisation_combinations,
 )
-from identification.models import Law
 from rig.errors import RecordingError
 from rig.measurements import response_matrices
 from rig.recording.reader import Recording
@@ -157,15 +156,10 @@ def _structured(options: Options, say: Callable[[str], None]) -> Callable[..., S
 
 
 def _identify_structured(
-    training: Sequence[Experiment],
-    *,
-    validation: Sequence[Experiment],
-    modes: LinearModes,
-    laws: tuple[Law, ...],
-    support: float,
+    training: Sequence[Experiment], *, validation: Sequence[Experiment], modes: LinearModes, **how: Any
 ) -> StructuredFit:
     """Fit one model; a structured model needs no validation data."""
-    return fit_structured(modes, training, laws=laws, support=support)
+    return fit_structured(modes, training, **how)
 
 
 def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment], **how: Any) -> PnlssFit:

@@ -87,15 +87,15 @@ class Options:
         for name in self.beside:
             if name not in self.specimen.beside:
                 raise ConfigurationError(f"`beside` {name}: allowed is {', '.join(self.specimen.beside)}")
-        wrong = self.without - set(PARTS)
-        if wrong:
-            raise ConfigurationError(f"`without` {min(wrong)}: allowed is {', '.join(PARTS)}")
-        if self.models != PAPER and not (isinstance(self.models, int) and self.models > 0):
-            raise ConfigurationError(f"`models` {self.models}: allowed is a number from 1, or {PAPER}")
-        if not 0.0 <= self.scatter <= 0.05:
-            raise ConfigurationError(f"`scatter` {self.scatter:g}: allowed is 0 to 0.05")
-        if self.channel not in self.specimen.outputs:
-            raise ConfigurationError(f"`channel` {self.channel}: allowed is {', '.join(self.specimen.outputs)}")
+        numbers = isinstance(self.models, int) and self.models > 0
+        for name, text, right, allowed in (
+            ("without", min(self.without - set(PARTS), default=""), self.without <= set(PARTS), ", ".join(PARTS)),
+            ("models", str(self.models), self.models == PAPER or numbers, f"a number from 1, or {PAPER}"),
+            ("scatter", f"{self.scatter:g}", 0.0 <= self.scatter <= 0.05, "0 to 0.05"),
+            ("channel", self.channel, self.channel in self.specimen.outputs, ", ".join(self.specimen.outputs)),
+        ):
+            if not right:
+                raise ConfigurationError(f"`{name}` {text}: allowed is {allowed}")
         for name, value in (("states", self.states), ("realisations", self.realisations)):
             if value is not None and value < 1:
                 raise ConfigurationError(f"`{name}` {value}: allowed is 1 and above")

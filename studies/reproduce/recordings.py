@@ -112,7 +112,6 @@ def training_data(options: Options, path: Path, *, given: str | None = None) -> 
 
 
 def _bench(options: Options) -> Bench:
-    """Return the bench, with scatter if that was requested."""
     if not options.scatter:
         return options.bench
     driver = options.bench.driver

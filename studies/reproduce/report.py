@@ -8,25 +8,11 @@ from identification.models import SAME_LEVEL
 from rig.errors import RecordingError
 from rig.results.predictions.table import CUT
 from rig.system.text_files import read_text
-from rig.text.console import finite, number, print_table
+from rig.text.column import Column
+from rig.text.console import finite, number, print_rows, print_table
 from studies.reproduce.folder import write_json
 from studies.reproduce.options import Options
 from studies.reproduce.study import Study
-
-_ERROR_COLUMNS = (
-    "variant",
-    "training_set",
-    "test",
-    "model",
-    "mean",
-    "standard_deviation",
-    "largest",
-    "models",
-    "runs",
-    "unbounded_runs",
-    "unbounded_models",
-    "range_use",
-)
 
 
 def write_tables(study: Study) -> None:
@@ -34,11 +20,14 @@ def write_tables(study: Study) -> None:
     summary = study.summary()
     write_json(study.options.result("table.json"), finite(summary))
     text = io.StringIO()
-    rows = csv.DictWriter(text, _ERROR_COLUMNS, lineterminator="\n")
+    errors = [
+        {"variant": variant, **error, "model": error["model"] or "all"}
+        for variant, of_all in summary["errors"].items()
+        for error in of_all
+    ]
+    rows = csv.DictWriter(text, list(dict.fromkeys(key for row in errors for key in row)), lineterminator="\n")
     rows.writeheader()
-    for variant, errors in summary["errors"].items():
-        for error in errors:
-            rows.writerow({"variant": variant, **error, "model": error["model"] or "all"})
+    rows.writerows(errors)
     path = study.options.result("errors.csv")
     try:
         path.write_text(text.getvalue(), encoding="utf-8")
@@ -75,20 +64,15 @@ def _say_variants(study: Study) -> None:
 
 
 def _say_times(study: Study) -> None:
-    print_table(
-        ("trained at", "models", "s a model", "at most s", "iterations", "s an iteration", "chosen"),
-        [
-            (
-                row["training_set"],
-                str(row["models"]),
-                number(row["seconds_mean"], ".1f"),
-                number(row["seconds_most"], ".1f"),
-                number(row["iterations_mean"], ".0f"),
-                number(row["seconds_per_iteration"], ".3f"),
-                number(row["chosen_mean"], ".0f"),
-            )
-            for row in study.models.times()
-        ],
+    print_rows(
+        study.models.times(),
+        Column("training_set", "trained at"),
+        Column("models", "models"),
+        Column("seconds_mean", "s a model", pattern=".1f"),
+        Column("seconds_most", "at most s", pattern=".1f"),
+        Column("iterations_mean", "iterations", pattern=".0f"),
+        Column("seconds_per_iteration", "s an iteration", pattern=".3f"),
+        Column("chosen_mean", "chosen", pattern=".0f"),
     )
     print()
 
@@ -123,21 +107,20 @@ def _say_steady(study: Study) -> None:
 
 def _say_sweeps(study: Study) -> None:
     print("sweeps simulated by the selected models, drive channel:")
-    rows = []
-    for row in (one.row() for one in study.sweeps):
-        rows.append(
-            (
-                row["sweep"],
-                row["training_set"],
-                row["from"],
-                number(row["peak_measured"], ".3f"),
-                number(row["peak_error"], "+.1f", 100.0),
-                number(row["rms_error"], ".1f", 100.0),
-                number(row["range_use"], ".2f"),
-                f"unbounded from {row['unbounded_at_s']:.2f} s on" if row["unbounded"] else "",
-            )
-        )
-    print_table(("sweep", "trained at", "from", "peak m/s^2", "peak error %", "RMS error %", "range use", ""), rows)
+    rows = [one.row() for one in study.sweeps]
+    for row in rows:
+        row["lost"] = f"unbounded from {row['unbounded_at_s']:.2f} s on" if row["unbounded"] else ""
+    print_rows(
+        rows,
+        Column("sweep", "sweep"),
+        Column("training_set", "trained at"),
+        Column("from", "from"),
+        Column("peak_measured", "peak", "m/s^2", ".3f"),
+        Column("peak_error", "peak error", "%", "+.1f", 100.0),
+        Column("rms_error", "RMS error", "%", ".1f", 100.0),
+        Column("range_use", "range use", pattern=".2f"),
+        Column("lost", ""),
+    )
     print()
 
 
@@ -152,15 +135,8 @@ def _say_others(options: Options) -> None:
             continue
         for row in found:
             if row["model"] is None:
-                rows.append(
-                    (
-                        path.parent.name,
-                        row["training_set"],
-                        row["test"],
-                        number(row["mean"], ".2f", 100.0),
-                        f"{row['unbounded_runs']} of {row['runs']}",
-                    )
-                )
+                mean, unbounded = number(row["mean"], ".2f", 100.0), f"{row['unbounded_runs']} of {row['runs']}"
+                rows.append((path.parent.name, row["training_set"], row["test"], mean, unbounded))
     if len({row[0] for row in rows}) > 1:
         print("all kinds of models in this folder:")
         print_table(("models", "trained at", "tested at", "mean error %", "unbounded"), rows)

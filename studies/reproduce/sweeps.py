@@ -108,17 +108,12 @@ def _simulated(
         run = coupled_run(model, exciter, experiment.inputs[0], lowest_hz=lowest_hz)
     there = experiment.counted_outputs[find_role(experiment.output_channels, "drive")]
     here = run.outputs[find_role(model.outputs, "drive"), experiment.counted_from :]
-    at = (
-        None
-        if run.unbounded_at is None
-        else max(run.unbounded_at - experiment.counted_from, 0) / experiment.sample_rate_hz
-    )
-    least = int(
-        np.ceil(experiment.sample_rate_hz / min(plan.start_hz, plan.stop_hz))
-    )  # an envelope needs at least one period
+    rate_hz, lost = experiment.sample_rate_hz, run.unbounded_at
+    at = None if lost is None else max(lost - experiment.counted_from, 0) / rate_hz
+    least = int(np.ceil(rate_hz / min(plan.start_hz, plan.stop_hz)))  # an envelope needs at least one period
     width = max(least, there.size // _BINS)
-    seconds = (np.arange(there.size // width) + 0.5) * width / experiment.sample_rate_hz
-    swept = max(0.0, experiment.counted / experiment.sample_rate_hz - plan.sweep_s)
+    seconds = (np.arange(there.size // width) + 0.5) * width / rate_hz
+    swept = max(0.0, experiment.counted / rate_hz - plan.sweep_s)
     share = np.clip((seconds - swept) / plan.sweep_s, 0.0, 1.0)
     return SweepResult(
         sweep=sweep,

@@ -43,14 +43,8 @@ class Truth:
     def of(cls, held: Held, level: float, force_n: float, responses: PeriodicResponses) -> "Truth":
         """Create the truth, with the largest amplitude among the responses."""
         top = int(np.argmax(responses.amplitude_m))
-        return cls(
-            held,
-            level,
-            force_n,
-            responses,
-            float(responses.amplitude_m[top]),
-            float(responses.frequency_hz[top]),
-        )
+        peak = float(responses.amplitude_m[top]), float(responses.frequency_hz[top])
+        return cls(held, level, force_n, responses, *peak)
 
     @property
     def text(self) -> str:

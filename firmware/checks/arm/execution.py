@@ -48,11 +48,6 @@ class Functions:
         return self._known[address]
 
 
-def is_boards(name: str) -> bool:
-    """Whether a function belongs to the board, or to the host in the same program."""
-    return name.startswith(("board_", "host_"))
-
-
 class Reader:
     """Follows the trace of a run, an instruction at a time."""
 
@@ -77,7 +72,7 @@ class Reader:
         self.counts.steady += self._in_steady
         if name.startswith(("vl_", "board_", "host_")) or not name.startswith(("mem", "__")):
             self._owner = name
-        if not is_boards(self._owner):
+        if not self._owner.startswith(("board_", "host_")):  # the host is in the same program
             self._count(name)
         elif begins and name == "board_lock":
             self._locked = 0

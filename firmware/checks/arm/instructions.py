@@ -5,6 +5,7 @@ QEMU counts instructions, not cycles, and knows no wait states of a flash. What 
 
 from collections import Counter
 from pathlib import Path
+from statistics import fmean
 
 from execution import CALLED, Counts, traced
 from tools import OPTIMISATIONS, WIRES, load, said, table
@@ -15,23 +16,13 @@ CLOCK_HZ = 170e6
 TIMER_TICK = 40  # instructions: 25 MHz where an instruction takes 1 ns
 
 
-def mean(numbers: list[int]) -> float:
-    """Their mean."""
-    return sum(numbers) / len(numbers)
-
-
-def by_block(calls: list[int], block: int) -> list[int]:
-    """Instructions of vl_serve in each block: one call a sample."""
-    return [sum(calls[at : at + block]) for at in range(0, len(calls), block)]
-
-
 def row(wire: str, optimisation: str, block: int, counts: Counts) -> list[object]:
     """A row of the table of instructions."""
     output, input_, serve = (counts.calls["steady", name] for name in CALLED)
-    a_block = by_block(serve, block)
-    a_sample = mean(output) + mean(input_) + mean(a_block) / block
+    a_block = [sum(serve[at : at + block]) for at in range(0, len(serve), block)]  # vl_serve is called once a sample
+    a_sample = fmean(output) + fmean(input_) + fmean(a_block) / block
     share = 100 * a_sample * RATE_HZ / CLOCK_HZ
-    numbers = [f"{mean(one):.0f} / {max(one)}" for one in (output, input_, a_block)]
+    numbers = [f"{fmean(one):.0f} / {max(one)}" for one in (output, input_, a_block)]
     return [f"{wire}, {optimisation}", block, *numbers, max(serve), f"{share:.1f}", f"{2 * share:.1f}"]
 
 
@@ -81,13 +72,13 @@ HEAD_OF_FUNCTIONS = ["wire", "functions, instructions a sample", "by trace", "by
 
 def report(build: Path) -> str:
     """Tables of instructions: by block; at worst; by function, with how well trace and timer agree."""
-    by_block_, worst, missing, functions = (list[list[object]]() for _ in range(4))
+    by_block, worst, missing, functions = (list[list[object]]() for _ in range(4))
     for optimisation in OPTIMISATIONS:
         for wire in WIRES:
             for block in BLOCKS:
                 elf = load(build, wire, optimisation, block)
                 counts = traced(elf)
-                by_block_.append(row(wire, optimisation, block, counts))
+                by_block.append(row(wire, optimisation, block, counts))
             worst.append(at_worst(wire, optimisation, counts))
             missing.append(where_outputs_are_missing(wire, optimisation, counts))
             timed = TIMER_TICK * said(elf)[0]
@@ -95,7 +86,7 @@ def report(build: Path) -> str:
     return "\n\n".join(
         [
             f"{RATE_HZ} Hz; mean / most. Share: of the cycles of {CLOCK_HZ / 1e6:.0f} MHz at one cycle an instruction.",
-            table(HEAD, by_block_),
+            table(HEAD, by_block),
             "At most, with the watchdog's trip and ramp; locked: between `board_lock` and `board_unlock`.",
             table(HEAD_AT_WORST, worst),
             f"`vl_output` where an output is missing, in blocks of {BLOCKS[-1]}. The first looks for the period's extremes.",

@@ -85,14 +85,10 @@ def add_libraries(graph: Graph, elf: Path) -> None:
 
 def frame_in(body: str) -> int:
     """Bytes that machine code puts on the stack."""
-    pushed = sum(4 * registers_in(listed) for listed in re.findall(r"(?:\bpush|stmdb\s+sp!,)\S*\s+\{([^}]*)\}", body))
+    lists = re.findall(r"(?:\bpush|stmdb\s+sp!,)\S*\s+\{([^}]*)\}", body)  # of registers: r4, r5, r6, lr
+    pushed = sum(4 * len(listed.split(",")) for listed in lists)
     taken = sum(int(number) for number in re.findall(r"\bsub\S*\s+sp, (?:sp, )?#(\d+)", body))
     return pushed + taken + sum(int(number) for number in re.findall(r"\bstr\S*\s+[\w, ]+\[sp, #-(\d+)\]!", body))
-
-
-def registers_in(listed: str) -> int:
-    """How many registers a list such as ``r4, r5, r6, lr`` names."""
-    return len(listed.split(","))
 
 
 def painted(memory: bytes) -> int:

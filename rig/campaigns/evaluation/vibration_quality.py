@@ -69,11 +69,6 @@ def lag_scatter_deg(rows: Rows) -> float:
     return math.degrees(std_of(seen[np.isfinite(seen)].astype(float) for seen in errors))
 
 
-def mean_voltage_v(rows: Rows) -> float:
-    """Mean amplitude of the output, V."""
-    return mean_of(np.abs(stretch["command_v"]) for stretch in stretches(rows))
-
-
 def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: Rows, held: bool = True) -> tuple[str, ...]:
     """Return warnings about a recorded vibration, one line each. The scatter of a lag that was not ``held`` is ignored."""
     out = [*vibration.warnings, *quantisation_warnings(vibration, bench)]
@@ -106,7 +101,7 @@ def vibration_part(vibration: PeriodicVibration, rows: Rows) -> Vibration:
         frequency_hz=vibration.frequency_hz,
         force_n=vibration.force_n,
         amplitude_m=vibration.amplitude_m,
-        voltage_v=mean_voltage_v(rows),
+        voltage_v=mean_of(np.abs(stretch["command_v"]) for stretch in stretches(rows)),
         purity=purity(vibration),
         periods=vibration.periods,
         spectrum=Spectrum(

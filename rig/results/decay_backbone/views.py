@@ -53,20 +53,12 @@ def draw_decay(page: Figure, found: DecayBackbone) -> None:
     panels = page.subplots(len(found.modes), 2, squeeze=False)
     for (left, right), mode in zip(panels, found.modes, strict=True):
         amplitude, unit = engineering(mode.amplitude_m)
-        left.errorbar(
-            amplitude, mode.modal_frequency_hz, mode.modal_frequency_bound_95_hz, fmt="o-", color=MAIN, capsize=2
-        )
-        right.errorbar(
-            amplitude,
-            100.0 * mode.damping_ratio,
-            100.0 * mode.damping_ratio_bound_95,
-            fmt="o-",
-            color=SECOND,
-            capsize=2,
-        )
-        label = f"displacement amplitude of {mode.reference}, {unit}"
-        left.set(xlabel=label, ylabel="modal frequency, Hz", xscale="log")
-        right.set(xlabel=label, ylabel="modal damping ratio, %", xscale="log")
+        for axis, value, bound, colour, name in (
+            (left, mode.modal_frequency_hz, mode.modal_frequency_bound_95_hz, MAIN, "modal frequency, Hz"),
+            (right, 100.0 * mode.damping_ratio, 100.0 * mode.damping_ratio_bound_95, SECOND, "modal damping ratio, %"),
+        ):
+            axis.errorbar(amplitude, value, bound, fmt="o-", color=colour, capsize=2)
+            axis.set(xlabel=f"displacement amplitude of {mode.reference}, {unit}", ylabel=name, xscale="log")
         right.set_ylim(bottom=0.0)
         low, high = left.get_ylim()
         least = _SMALL_CHANGE * float(mode.modal_frequency_hz[-1])

@@ -6,6 +6,7 @@ import numpy as np
 
 from identification import Exciter
 from identification.exciter_coupling import PARAMETERS
+from rig.drawing.axes import ticks_at_1_2_5
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, title
 from rig.results.kind import Table
@@ -70,8 +71,6 @@ def draw_exciter(page: Figure, exciter: Exciter) -> None:
     residual and its noise; blocked force per volt; dynamic stiffness of the armature. The dots of the last two are what the
     measured force says of the one if the other is as fitted. A file without measured lines has no first column and no dots.
     """
-    from matplotlib.ticker import LogLocator
-
     lines = exciter.lines
     low = exciter.lowest_hz if np.isfinite(exciter.lowest_hz) else 5.0
     high = exciter.highest_hz if np.isfinite(exciter.highest_hz) else 500.0
@@ -96,9 +95,7 @@ def draw_exciter(page: Figure, exciter: Exciter) -> None:
         phase.set(ylabel=f"{name.removesuffix(' force')} phase, deg")
     for axis in axes.ravel():
         axis.set(xscale="log", xlabel="frequency, Hz")
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.xaxis.set_major_formatter("{x:g}")
-        axis.xaxis.set_minor_formatter("")
+        ticks_at_1_2_5(axis)
     _explain(axes[0, -2], bool(drawn), lines is not None)
     title(page, _title(exciter, low, high))
 

@@ -10,7 +10,8 @@ from rig.drawing.lines import without_wraps
 from rig.drawing.page import grid
 from rig.drawing.style import COLOURS, MAIN, REJECTED, Figure, title, unit_text
 from rig.results.kind import Table
-from rig.text.console import number, print_table
+from rig.text.column import Column
+from rig.text.console import print_rows
 
 
 def _summarise(found: HammerTest) -> dict[str, Any]:
@@ -37,12 +38,12 @@ def _say(summary: dict[str, Any]) -> None:
     window = f", exponential window {summary['decay_rate_1_s']:.3g} 1/s" if summary["decay_rate_1_s"] else ""
     print(f"{used} of {len(summary['hits'])} hits of {summary['record_s']:.4g} s count{window}")
     print(f"{summary['estimator']}, {summary['lines']} lines, {low:.4g} to {high:.4g} Hz")
-    print_table(
-        ("hit", "peak N", "pulse ms", "fault"),
-        [
-            (hit["label"], number(hit["peak_n"], ".4g"), number(hit["duration_s"], ".3g", 1e3), hit["fault"] or "-")
-            for hit in summary["hits"]
-        ],
+    print_rows(
+        [{**hit, "fault": hit["fault"] or "-"} for hit in summary["hits"]],
+        Column("label", "hit"),
+        Column("peak_n", "peak", "N", ".4g"),
+        Column("duration_s", "pulse", "ms", ".3g", 1e3),
+        Column("fault", "fault"),
     )
     coherence = ", ".join(f"{name} {value:.4f}" for name, value in summary["coherence_median"].items())
     print(f"median coherence: {coherence}")

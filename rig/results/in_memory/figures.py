@@ -146,10 +146,7 @@ def draw_periodic(page: Figure, found: PeriodicResponses) -> None:
     draw_stability(size, found.frequency_hz, factor * found.amplitude_m, stable, MAIN, "harmonic balance", "unstable")
     displacement_lag = (180.0 + found.phase_lag_deg) % 360.0
     draw_stability(lag, found.frequency_hz, displacement_lag, stable, MAIN, "harmonic balance", "unstable")
-    size.set(xlabel="frequency, Hz", ylabel=f"displacement amplitude, {unit}")
-    size.legend()
-    lag.axhline(90.0, color=REJECTED, lw=0.8)
-    lag.set(xlabel="frequency, Hz", ylabel="phase lag of displacement, deg")
+    _label(size, lag, unit)
     title(page, f"harmonic balance, {found.frequency_hz.size} points")
 
 

@@ -22,7 +22,7 @@ from rig.check import report as checks
 from rig.results.in_memory.figures import as_predictions
 from rig.results.predictions.table import ERRORS, TABLE as PREDICTIONS
 from rig.text.column import Column
-from rig.text.console import number, print_columns, print_rows, print_table
+from rig.text.console import print_columns, print_rows, print_table
 from rig.tuning import Tuning
 from rig.tuning.report import lines
 from simulators.analysis import PeriodicResponses
@@ -91,12 +91,12 @@ def say_distortion(found: DistortionLevels) -> None:
     """Print distortion over signal of every channel."""
     print(f"distortion of what is driven by {found.input}, over the signal, root mean square of the band")
     names = [channel.name for channel in found.channels]
-    print_table(
-        ("channel", "excited lines %", "odd lines %", "even lines %"),
-        [
-            (name, *(number(found.ratio(name, lines), ".3g", 100.0) for lines in ("excited", "odd", "even")))
-            for name in names
-        ],
+    print_columns(
+        ("channel", "", names),
+        *(
+            (f"{lines} lines %", ".3g", [100.0 * found.ratio(name, lines) for name in names])
+            for lines in ("excited", "odd", "even")
+        ),
     )
 
 

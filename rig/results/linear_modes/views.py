@@ -22,7 +22,8 @@ from rig.drawing.style import (
     unit_text,
 )
 from rig.results.kind import Exchange, Table
-from rig.text.console import number, print_table
+from rig.text.column import Column
+from rig.text.console import number, print_rows
 from rig.text.contents import Contents
 
 
@@ -50,19 +51,16 @@ def _say(summary: dict[str, Any]) -> None:
     residual = summary["fit_residual"]
     left = "" if residual != residual else f"; residual {number(residual, '.2f')} times that expected from noise"
     print(f"{source}{low:g} to {high:g} Hz{level}{left}")
-    print_table(
-        ("mode", "frequency Hz", "+-", "damping %", "+-", *(f"shape {name}" for name in summary["channels"])),
-        [
-            (
-                str(index + 1),
-                number(m["frequency_hz"], ".4f"),
-                number(m["frequency_std_hz"], ".4f", 1.96),
-                number(m["damping_ratio"], ".4f", 100.0),
-                number(m["damping_ratio_std"], ".4f", 196.0),
-                *(number(value, ".5f") for value in summary["shapes"][index]),
-            )
-            for index, m in enumerate(summary["modes"])
-        ],
+    names = [f"shape {name}" for name in summary["channels"]]
+    found = enumerate(zip(summary["modes"], summary["shapes"], strict=True), 1)
+    print_rows(
+        [{"mode": index, **mode, **dict(zip(names, shape, strict=True))} for index, (mode, shape) in found],
+        Column("mode", "mode"),
+        Column("frequency_hz", "frequency", "Hz", ".4f"),
+        Column("frequency_std_hz", "+-", "", ".4f", 1.96),
+        Column("damping_ratio", "damping", "%", ".4f", 100.0),
+        Column("damping_ratio_std", "+-", "", ".4f", 196.0),
+        *(Column(name, name, "", ".5f") for name in names),
     )
 
 
@@ -177,17 +175,9 @@ def _mac(axis: Axes, modes: LinearModes) -> None:
     axis.set(xlabel="mode, Hz", ylabel="mode, Hz")
     axis.grid(False)
     axis.set_title("MAC at these sensors")
+    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": "small" if len(mac) < 9 else "xx-small"}
     for (row, column), value in np.ndenumerate(mac):
-        colour = "white" if value > 0.6 else "black"
-        axis.text(
-            column,
-            row,
-            f"{value:.2f}",
-            ha="center",
-            va="center",
-            fontsize="small" if len(mac) < 9 else "xx-small",
-            color=colour,
-        )
+        axis.text(column, row, f"{value:.2f}", color="white" if value > 0.6 else "black", **look)
 
 
 def _linear_modes(modes: LinearModes) -> Contents:

@@ -133,15 +133,11 @@ def _errors(axis: Axes, found: "SimulatedModel") -> None:
     if not bounded:
         say_why_empty(axis, f"all {lost} runs become unbounded: no errors")
         return
-    for use, (colour, mark) in _USES.items():
-        of_use = [run for run in bounded if run.use == use]
+    for use, (colour, mark) in (*_USES.items(), ("unknown use", (THIRD, MARKERS[3]))):
+        of_use = [run for run in bounded if (run.use if run.use in _USES else "unknown use") == use]
         if of_use:
             errors = [100.0 * run.error.max() for run in of_use]
             axis.semilogy([run.range_use for run in of_use], errors, mark, color=colour, label=use)
-    others = [run for run in bounded if run.use not in _USES]
-    if others:
-        errors = [100.0 * run.error.max() for run in others]
-        axis.semilogy([run.range_use for run in others], errors, MARKERS[3], color=THIRD, label="unknown use")
     axis.axvline(1.0, color=REJECTED, lw=0.9, ls="--", label="largest of the training data")
     axis.set(xlabel="range use", ylabel="largest error, %", xlim=(0.0, 1.02 * axis.get_xlim()[1]))
     plain_log(axis)

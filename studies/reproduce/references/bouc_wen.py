@@ -21,9 +21,10 @@ from identification import (
     pnlss_errors,
 )
 from rig.errors import RecordingError
+from rig.text.column import Column
 from studies.reproduce.references.data import DataFile, DataSet
 from studies.reproduce.references.fits import fit_text, lines_of
-from studies.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
+from studies.reproduce.references.result import Curve, Line, Panel, ReferenceStudy, Say, StudyResult
 from vibrolock.arrays import Float
 
 _RATE_HZ = 750.0
@@ -108,10 +109,10 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
     return StudyResult(
         title="Bouc-Wen, a simulated hysteresis",
         columns=(
-            Column("multisine_db", "test multisine, dB", ".1f"),
-            Column("sweep_db", "sine sweep, dB", ".1f"),
-            Column("validation_percent", "validation, %", ".2f"),
-            Column("seconds", "s", ".1f"),
+            Column("multisine_db", "test multisine, dB", pattern=".1f"),
+            Column("sweep_db", "sine sweep, dB", pattern=".1f"),
+            Column("validation_percent", "validation, %", pattern=".2f"),
+            Column("seconds", "s", pattern=".1f"),
         ),
         lines=lines_of(fits, chosen, lambda model: _figures(model, data)),
         published=_PUBLISHED,

@@ -19,8 +19,9 @@ from identification import (
     stepped_sine_mode,
 )
 from rig.exchange.reading import read_frequency_responses
+from rig.text.column import Column
 from studies.reproduce.references.data import DataFile, DataSet
-from studies.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
+from studies.reproduce.references.result import Curve, Line, Panel, ReferenceStudy, Say, StudyResult
 
 _MAPPING = Path(__file__).with_name("brake-reuss-mapping.toml")
 _WINDOW_DEG = 60.0
@@ -44,12 +45,12 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
     return StudyResult(
         title="Brake-Reuss beam, force-controlled responses predicted from response-controlled ones",
         columns=(
-            Column("peak_percent", "peak, %", "+.2f"),
-            Column("frequency_percent", "its frequency, %", "+.3f"),
-            Column("recorded_peak_percent", "peak at the recorded force, %", "+.2f"),
-            Column("recorded_frequency_percent", "frequency there, %", "+.3f"),
-            Column("recorded_envelope_percent", "envelope there, %", ".2f"),
-            Column("range_use", "range use", ".2f"),
+            Column("peak_percent", "peak, %", pattern="+.2f"),
+            Column("frequency_percent", "its frequency, %", pattern="+.3f"),
+            Column("recorded_peak_percent", "peak at the recorded force, %", pattern="+.2f"),
+            Column("recorded_frequency_percent", "frequency there, %", pattern="+.3f"),
+            Column("recorded_envelope_percent", "envelope there, %", pattern=".2f"),
+            Column("range_use", "range use", pattern=".2f"),
         ),
         lines=tuple(lines),
         notes=(

@@ -47,14 +47,8 @@ def _compare(axis: "Axes", result: StudyResult) -> None:
     lines = [line for line in (*result.published, *result.lines) if np.isfinite(line.values.get(key, np.nan))]
     for row, line in enumerate(lines):
         ours = line in result.lines
-        axis.plot(
-            line.values[key],
-            row,
-            "o" if ours else "D",
-            color=MAIN if ours else THIRD,
-            mfc=None if line.chosen or not ours else "none",
-            ms=7,
-        )
+        mark, colour = ("o", MAIN) if ours else ("D", THIRD)
+        axis.plot(line.values[key], row, mark, color=colour, mfc=None if line.chosen or not ours else "none", ms=7)
     axis.set_yticks(range(len(lines)), [f"{line.method}{' (chosen)' if line.chosen else ''}" for line in lines])
     axis.set(xlabel=heading, ylim=(len(lines) - 0.5, -0.5))
     axis.grid(axis="y", visible=False)

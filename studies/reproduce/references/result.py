@@ -7,24 +7,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from rig.text.column import Column
 from studies.reproduce.references.data import DataSet
 
 Say = Callable[[str], None]
 
 OURS = "this version"
 """Source of a figure that the study has computed."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """A figure that models are compared by."""
-
-    key: str
-    """Name in the results; it ends with the unit."""
-    heading: str
-    """Heading in tables."""
-    pattern: str
-    """Format of its numbers."""
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,10 @@ from identification import (
     pnlss_errors,
 )
 from rig.errors import RecordingError
+from rig.text.column import Column
 from studies.reproduce.references.data import DataFile, DataSet
 from studies.reproduce.references.fits import fit_text, lines_of
-from studies.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
+from studies.reproduce.references.result import Curve, Line, Panel, ReferenceStudy, Say, StudyResult
 
 _ARROW = 40_000
 _FIRST_PERIOD, _PERIOD, _BLOCK, _AHEAD = 40_984, 8192, 8692, 500
@@ -104,12 +105,12 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
     return StudyResult(
         title="Silverbox, a measured oscillator with a hardening spring",
         columns=(
-            Column("arrow_mv", "whole arrow, mV RMS", ".4f"),
-            Column("validation_mv", "validation, mV RMS", ".4f"),
-            Column("estimation_mv", "estimation, mV RMS", ".4f"),
-            Column("range_use", "range use", ".2f"),
-            Column("parameters", "parameters", ".0f"),
-            Column("seconds", "s", ".1f"),
+            Column("arrow_mv", "whole arrow, mV RMS", pattern=".4f"),
+            Column("validation_mv", "validation, mV RMS", pattern=".4f"),
+            Column("estimation_mv", "estimation, mV RMS", pattern=".4f"),
+            Column("range_use", "range use", pattern=".2f"),
+            Column("parameters", "parameters", pattern=".0f"),
+            Column("seconds", "s", pattern=".1f"),
         ),
         lines=lines_of(fits, chosen, lambda model: _figures(model, data)),
         published=_PUBLISHED,
