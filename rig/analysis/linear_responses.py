@@ -11,9 +11,9 @@ from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MAIN, Figure
 from rig.errors import ConfigurationError
-from rig.text.console import number, print_table
+from rig.text.console import print_columns
 from simulators.analysis import FrequencyResponses, frequency_response
-from vibrolock.arrays import Complex
+from vibrolock.arrays import Complex, Float
 
 _BELOW_LOWEST_MODE, _ABOVE_HIGHEST_MODE = 0.5, 1.2
 """Ends of the default range over the lowest and the highest mode; chosen."""
@@ -54,7 +54,7 @@ class Responses(Study):
     def print_tables(self) -> None:
         """Print magnitudes and phases at the structure's modes within the range, and at both ends."""
         f, modes = self.found.frequency_hz, self.subject.rig.linear_modes.frequency_hz
-        shown = {0, f.size - 1} | {int(np.argmin(np.abs(f - m))) for m in modes if f[0] <= m <= f[-1]}
+        shown = sorted({0, f.size - 1} | {int(np.argmin(np.abs(f - m))) for m in modes if f[0] <= m <= f[-1]})
         drive = next(channel.name for channel in self.subject.bench.channels if channel.role == "drive")
         curves = {
             "force N/V": self.force_n_per_v,
@@ -62,20 +62,11 @@ class Responses(Study):
             f"{drive} m/s^2/N": self.accelerance_per_kg[drive],
         }
         print("at the modes of the structure and at both ends, magnitude and phase in deg (all points with --json)")
-        print_table(
-            ("frequency Hz", *(heading for name in curves for heading in (name, "phase"))),
-            [
-                (
-                    f"{f[k]:.4f}",
-                    *(
-                        text
-                        for curve in curves.values()
-                        for text in (number(abs(curve[k]), ".4g"), number(np.angle(curve[k]), ".1f", 180.0 / np.pi))
-                    ),
-                )
-                for k in sorted(shown)
-            ],
-        )
+        columns: list[tuple[str, str, Float]] = [("frequency Hz", ".4f", f[shown])]
+        for name, curve in curves.items():
+            columns.append((name, ".4g", np.abs(curve[shown])))
+            columns.append(("phase", ".1f", 180.0 / np.pi * np.angle(curve[shown])))
+        print_columns(*columns)
 
     def draw_on(self, page: Figure) -> None:
         """Draw magnitudes and phases; each channel has the same colour in all columns."""

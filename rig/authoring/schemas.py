@@ -67,9 +67,7 @@ def bench_schema() -> Schema:
         rules = {"required": ["options"], "properties": {"options": rules}}
         asked["properties"]["driver"].setdefault("allOf", []).append(_where_named(name, rules))
         definitions[f"{name}-options"] = loosened.table(option)
-    driver = definitions[
-        "DriverChoiceChanges"
-    ]  # those of the product have known options, others have options of their own
+    driver = definitions["DriverChoiceChanges"]  # those of the product have known options, others options of their own
     known = {name: {"$ref": f"#/definitions/{name}-options"} for name in options}
     driver["properties"]["options"]["anyOf"] = [*known.values(), {"type": "object"}]  # so that an editor completes them
     driver["allOf"] = [_where_named(name, {"properties": {"options": own}}) for name, own in known.items()]

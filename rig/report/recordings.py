@@ -82,9 +82,8 @@ def _points(kind: str, points: Sequence[Point[object]], summary: Mapping[str, An
     with collected() as printed:
         print_findings({**summary, "skipped": "", "measured_again": ""})
     blocks += blocks_of(printed, "")
-    blocks += [
-        Text(f"{point_name(p.number)} repeats the first, for the drift.", "note") for p in points if p.repeats_first
-    ]
+    repeats = [point_name(point.number) for point in points if point.repeats_first]
+    blocks += [Text(f"{name} repeats the first, for the drift.", "note") for name in repeats]
     former = points_from(kind, summary["former_points"])
     if former:
         blocks.append(point_table(kind, former, "No longer asked for by the plan, and not used"))

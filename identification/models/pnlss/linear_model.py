@@ -106,15 +106,6 @@ def with_independent_states(model: PnlssModel, experiments: Sequence[Experiment]
     return replace(model, a=inverse @ model.a @ root, b=inverse @ model.b, c=model.c @ root)
 
 
-def hardly_seen_states(model: PnlssModel, experiments: Sequence[Experiment]) -> int:
-    """Number of states (`with_independent_states`) that contribute less than 0.002 of the first state's share to the outputs.
-
-    Such states model noise or systematic errors; true further modes of measured structures contributed 0.01 and more.
-    """
-    seen = np.diag(_observability(model, experiments))
-    return int(np.count_nonzero(seen < _HARDLY**2 * np.max(seen)))
-
-
 def _observability(model: PnlssModel, experiments: Sequence[Experiment]) -> Float:
     """Observability Gramian, with outputs scaled by their RMS."""
     weight = 1.0 / np.sqrt(np.mean(np.hstack([e.counted_outputs for e in experiments]) ** 2, axis=1))
@@ -162,7 +153,8 @@ def linear_pnlss(
         notes=(*responses.notes, note),
     )
     model = with_independent_states(model, moved)
-    hardly = hardly_seen_states(model, moved)
+    seen = np.diag(_observability(model, moved))
+    hardly = int(np.count_nonzero(seen < _HARDLY**2 * np.max(seen)))
     more = f"states: {hardly} of {states} hardly move the outputs of the linear model; {states - hardly} may do"
     m = len(first.input_channels)
     b, d = np.zeros((states, m)), np.zeros((len(first.output_channels), m))
