@@ -11,6 +11,7 @@ Array = NDArray[Any]
 Labels = tuple[tuple[str, ...], ...]
 
 _SUFFIXES = {
+    **{"_rad_s": "rad/s", "_n_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m_s2": "m/s^2"},
     **{"_hz": "Hz", "_n": "N", "_m": "m", "_kg": "kg", "_deg": "deg", "_s": "s", "_v": "V", "_rad": "rad"},
     **{"modal_amplitude": "kg^0.5 m", "force_harmonics": "N", "shapes": "kg^-0.5"},
 }
