@@ -59,7 +59,7 @@ class Host:
 
     @property
     def _is_sampling(self) -> bool:
-        return self.python.device.is_sampling
+        return self.python.device._sampling.on
 
     @property
     def queue(self) -> int:
