@@ -50,7 +50,6 @@ def emulate(
     from rig.bench.configuration import validated
     from rig.emulator.process import run_emulator
     from rig.emulator.settings import EmulatorSettings
-    from rig.errors import ConfigurationError
 
     behind = load_bench(bench)
     given = {name: value for name, value in context.params.items() if name in EmulatorSettings.model_fields}
@@ -66,10 +65,7 @@ def emulate(
             block = _block(behind, ready)
             text = _bench_text(bench, block, ready, as_hardware)
         if bench_file is not None:
-            try:
-                bench_file.write_text(text, encoding="utf-8")
-            except OSError as error:
-                raise ConfigurationError(f"--bench-file {bench_file}: cannot be written: {error.strerror}") from error
+            _write_bench(bench_file, text)
         if json:
             facts = {"wire": wire, **ready.options, "block": block, "process": ready.process}
             print(jsonlib.dumps(facts), flush=True)
@@ -115,6 +111,15 @@ def _pair(text: str) -> list[str]:
     if len(names) != 2:
         raise ConfigurationError(f"--swap {text}: allowed is two channels with a comma between them")
     return names
+
+
+def _write_bench(path: Path, text: str) -> None:
+    from rig.errors import ConfigurationError
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"--bench-file {path}: cannot be written: {error.strerror}") from error
 
 
 def _check_bench_file(path: Path | None) -> None:
