@@ -72,7 +72,7 @@ def workers_stand_in_no_folder_that_goes():
     here = Path.cwd()
     yield
     executor = reusable_executor._executor
-    if executor is not None and any(_folder_of(worker) != here for worker in executor._processes or ()):
+    if executor is not None and any(_folder_of(worker) != here for worker in [*(executor._processes or ())]):
         executor.shutdown()
 
 
