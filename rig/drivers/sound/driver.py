@@ -229,7 +229,7 @@ class SoundDAQ(DAQ):
         return np.broadcast_to(np.asarray(given, float), len(self.channels))
 
     def _start(self) -> None:
-        assert self._device is not None
+        self._device = found(self._options.device, self._options.host_api)  # PortAudio was let go with the last stream
         options, factor = self._options, self._factor
         block, block_s = self.block * factor, self.block / self.sample_rate_hz
         if (options.queue + 1) * block < options.period_frames:

@@ -80,6 +80,7 @@ class Card:
     check_output_settings = check_input_settings
 
     def _StreamBase(self, kind, **given):  # noqa: N802 (the package's name)
+        assert self._initialized == 1
         if self.fault == "in use":
             raise PortAudioError("Device unavailable", -9985)
         assert kind == "duplex"

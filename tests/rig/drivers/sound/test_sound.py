@@ -287,6 +287,15 @@ def test_before_the_first_output_there_is_nothing_but_the_signal_of_the_cable(ca
         driven.exchange(10)  # no watchdog has tripped meanwhile
 
 
+def test_it_is_started_again_after_a_stop(card):
+    card()
+    with Driven(bench()) as driven:
+        driven.exchange(10)
+        driven.daq.stop()
+        driven.daq.start(128)
+        driven.exchange(10)
+
+
 def test_other_outputs_of_the_device_get_zero(card):
     made = card(outputs=4, gains=(0.5, 0.25, -1.0, 0.1))
     with Driven(bench(output=3)) as driven:
