@@ -1,8 +1,9 @@
 """An emulated sound card: a virtual rig as a client of a JACK server, where the driver ``sound`` finds it through PortAudio.
 
 The server is real (Debian's ``jackd2``), its back end is a clock without hardware. A server that is running already is used as
-it is; otherwise one is started, and ended with the emulator. Card and driver are in one graph of JACK: an output comes back in
-the inputs two periods later.
+it is; otherwise one is started, and ended with the emulator. It waits for its clients (``-S``): a rig that is left out for a
+period would see a step that no cable makes. Card and driver are in one graph of JACK: an output comes back in the inputs two
+periods later.
 """
 
 import os
@@ -160,7 +161,7 @@ def _server(jack: Any) -> Iterator[None]:
     program = shutil.which("jackd")
     if program is None:
         raise DaqRefused("the program jackd is not installed; on Debian: apt install jackd2")
-    command = [program, *_scheduling(), "-d", "dummy", "-r", str(RATE_HZ), "-p", str(PERIOD)]
+    command = [program, *_scheduling(), "-S", "-d", "dummy", "-r", str(RATE_HZ), "-p", str(PERIOD)]
     server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     try:
         until = time.monotonic() + START_S
