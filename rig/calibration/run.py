@@ -60,7 +60,7 @@ def calibrate(
     level_v = SHARE * allowed_v if rms_v is None else rms_v
     if level_v > 0.3 * allowed_v:  # a multisine's peak is about three times its RMS
         raise ConfigurationError(
-            field="rms_v", value=level_v, allowed=f"up to {0.3 * allowed_v:.3g} V, for limits and ranges"
+            field="voltage", value=level_v, unit="V", allowed=f"up to {0.3 * allowed_v:.3g} V, for limits and ranges"
         )
     plan = _plan(bare, level_v, seconds)
     with MultisineSeries(bare, recording, options, PURPOSE).play(plan) as recorded:

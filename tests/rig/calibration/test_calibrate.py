@@ -146,3 +146,9 @@ def test_a_calibrated_bench_is_not_calibrated_again(cables, command):
     said = command("calibrate", "calibrated.toml", "-o", "again.toml")
     assert said.status == 1
     assert "begin from the bench that it was made of" in said.err
+
+
+def test_a_voltage_beyond_the_limits_is_refused_by_its_option(cables, command):
+    said = command("calibrate", "bench.toml", "-o", "calibrated.toml", "--voltage", "4")
+    assert said.status == 1
+    assert "--voltage = 4 V" in said.err
