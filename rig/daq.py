@@ -91,6 +91,8 @@ class Adjustable(NamedTuple):
     """Whether the bench leaves the queue to what is measured before a run (`rig.loop.worker.queue_choice`)."""
     longest_period: int = 0
     """Longest period, samples, with which the device goes on where outputs come too late; 0 if it holds the last one."""
+    buffered_blocks: int = 0
+    """Blocks of outputs that lie ahead in the device's buffer besides the queue, with the bench's block."""
 
 
 class State(Enum):

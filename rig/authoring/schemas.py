@@ -107,6 +107,7 @@ def _unless(key: str, rules: Schema) -> Schema:
 
 def _options_of_drivers() -> dict[str, Schema]:
     from rig.drivers.can import CanOptions
+    from rig.drivers.nidaqmx.options import NiDaqmxOptions
     from rig.drivers.serial import SerialOptions
     from rig.drivers.sound.options import SoundOptions
     from rig.drivers.virtual.driver import Queue
@@ -115,7 +116,8 @@ def _options_of_drivers() -> dict[str, Schema]:
     del rig["properties"]["seed"]  # is given to the run
     rig["properties"] |= queue["properties"]
     rig["definitions"] |= queue["definitions"]
-    return {"virtual": rig, "serial": _of(SerialOptions), "can": _of(CanOptions), "sound": _of(SoundOptions)}
+    models = {"serial": SerialOptions, "can": CanOptions, "sound": SoundOptions, "nidaqmx": NiDaqmxOptions}
+    return {"virtual": rig, **{name: _of(model) for name, model in models.items()}}
 
 
 def _of(model: type[BaseModel]) -> Schema:

@@ -62,6 +62,7 @@ MODELS = {
     "serial": "rig.drivers.serial:SerialOptions",
     "can": "rig.drivers.can:CanOptions",
     "sound": "rig.drivers.sound.options:SoundOptions",
+    "nidaqmx": "rig.drivers.nidaqmx.options:NiDaqmxOptions",
     "faults": "rig.drivers.virtual.faults:PassingFaults",
     "virtual-rig": "simulators:VirtualRig",
     "beam": "simulators.parts:BeamStructure",
@@ -100,7 +101,7 @@ def tables() -> dict[str, type[BaseModel]]:
 
 def roots() -> tuple[type[BaseModel], ...]:
     """Return the models of what stands in files: plans, benches, options of drivers, virtual rigs, hypotheses, mappings."""
-    others = ("bench", "virtual", "serial", "can", "sound", "virtual-rig", "hypotheses", "time-data")
+    others = ("bench", "virtual", "serial", "can", "sound", "nidaqmx", "virtual-rig", "hypotheses", "time-data")
     return (*(campaign.plan for campaign in KINDS.values()), *(tables()[name] for name in others))
 
 

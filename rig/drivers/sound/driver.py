@@ -14,16 +14,12 @@ from rig.drivers.sound.loopback import FRAMES, measured_delay
 from rig.drivers.sound.options import SoundOptions
 from rig.drivers.sound.rates import PASS_BAND, Decimator, Interpolator, chosen_rate, factor_of, low_pass
 from rig.drivers.sound.stream import DuplexStream, Setting, counts_of
-from rig.drivers.wire.options import LARGEST_QUEUE
+from rig.drivers.wire.options import LARGEST_QUEUE, watchdog_range_s, watchdog_s
 from rig.errors import DaqMismatch, DaqRefused
 from vibrolock.arrays import Float
 
 LARGEST_BLOCK = 65536
 """Largest block, samples; chosen: more than a bench may have."""
-WATCHDOG_S, WATCHDOG_BLOCKS = 0.1, 4
-"""Default watchdog, s and blocks, the longer of the two; as of devices on a wire."""
-LONGEST_WATCHDOG_S = 1.0
-"""Longest watchdog, s: so long a vibration may go on without the host."""
 TIMEOUT_S, TIMEOUT_BLOCKS = 0.5, 10
 """Default wait for frames, s and blocks, the longer of the two."""
 LOWEST_CONTINUED_HZ = 2.0
@@ -128,7 +124,7 @@ class SoundDAQ(DAQ):
         return Adjustable(
             watchdog_s=self._watchdog_s,
             largest_queue=LARGEST_QUEUE,
-            watchdog_range_s=(2.0 * block_s, max(LONGEST_WATCHDOG_S, 10.0 * block_s)),
+            watchdog_range_s=watchdog_range_s((0.0, math.inf), block_s),
             rate_range_hz=(self.sample_rate_hz, self.sample_rate_hz),
             wire_share={self._bench.block: 0.0},
             largest_wire_share=1.0,
@@ -148,15 +144,7 @@ class SoundDAQ(DAQ):
 
     @property
     def _watchdog_s(self) -> float:
-        block_s = self._bench.block / self.sample_rate_hz
-        asked_s, longest_s = self._options.watchdog_s, max(LONGEST_WATCHDOG_S, 10.0 * block_s)
-        if asked_s is not None and not 2.0 * block_s <= asked_s <= longest_s:
-            raise DaqRefused(
-                field="driver.options.watchdog_s",
-                value=asked_s,
-                allowed=f"{2.0 * block_s:g} s, two blocks, to {longest_s:g} s",
-            )
-        return asked_s or max(WATCHDOG_S, WATCHDOG_BLOCKS * block_s)
+        return watchdog_s(self._options, 0.0, self._bench.block / self.sample_rate_hz, moves=True)
 
     @property
     def _longest_period(self) -> int:

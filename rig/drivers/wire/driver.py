@@ -141,9 +141,9 @@ class WireDAQ(DAQ):
             stream = Stream(len(bench.channels), block, bench.sample_rate_hz, facts.bits, queue)
             shares[block] = connection.link.load(stream).share
         return Adjustable(
-            watchdog_s=watchdog_s(self._options, facts, block_s),
+            watchdog_s=watchdog_s(self._options, facts.watchdog_s[0], block_s, moves=not facts.simulated),
             largest_queue=min(LARGEST_QUEUE, facts.largest_queue),
-            watchdog_range_s=watchdog_range_s(facts, block_s),
+            watchdog_range_s=watchdog_range_s(facts.watchdog_s, block_s),
             rate_range_hz=facts.rate_hz,
             wire_share=shares,
             largest_wire_share=MOST_LOAD,

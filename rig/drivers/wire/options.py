@@ -56,18 +56,18 @@ def _longest_s(block_s: float) -> float:
     return max(LONGEST_S, LONGEST_BLOCKS * block_s)
 
 
-def watchdog_range_s(facts: DeviceFacts, block_s: float) -> tuple[float, float]:
+def watchdog_range_s(device_s: tuple[float, float], block_s: float) -> tuple[float, float]:
     """Shortest and longest watchdog time that driver and device allow, s; `LONGEST_S` also for a device that moves nothing."""
-    shortest_s, longest_s = facts.watchdog_s
+    shortest_s, longest_s = device_s
     return max(shortest_s, SHORTEST_BLOCKS * block_s), min(longest_s, _longest_s(block_s))
 
 
-def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> float:
-    """Watchdog time to set, s.
+def watchdog_s(options: WireOptions, device_s: float, block_s: float, *, moves: bool) -> float:
+    """Watchdog time to set, s; ``device_s``: the shortest that the device can do; ``moves``: whether it may move something.
 
     Raises `DaqRefused` if it is shorter than two blocks, or too long for a device that moves something.
     """
-    chosen_s = options.watchdog_s or max(_default_s(block_s), facts.watchdog_s[0])
+    chosen_s = options.watchdog_s or max(_default_s(block_s), device_s)
     shortest_s, longest_s = SHORTEST_BLOCKS * block_s, _longest_s(block_s)
     if chosen_s < shortest_s:
         raise DaqRefused(
@@ -75,7 +75,7 @@ def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> floa
             value=chosen_s,
             allowed=f"from {shortest_s:g} s on, {SHORTEST_BLOCKS} blocks",
         )
-    if chosen_s > longest_s and not facts.simulated:
+    if chosen_s > longest_s and moves:
         whose = "" if options.watchdog_s else ", the shortest that the device can do"
         raise DaqRefused(
             f"driver.options.watchdog_s = {chosen_s:g}{whose}: allowed is up to {longest_s:g} s "

@@ -32,7 +32,7 @@ class Streaming:
         assert facts is not None
         connection.check_capacity(stream)
         block_s = stream.block / stream.rate_hz
-        wait_s = watchdog_s(options, facts, block_s)
+        wait_s = watchdog_s(options, facts.watchdog_s[0], block_s, moves=not facts.simulated)
         connection.check_latch()
         self._watchdog_s = wait_s
         self._set_up(stream, wait_s, options.ramp_s)

@@ -82,7 +82,8 @@ def settle_queue(
         return _choice(daq, bench, "open loop", longest, why)
     daq.adjust(allowed.largest_queue, max(allowed.watchdog_s, allowed.watchdog_range_s[1]))
     timing = measured_timing(daq, bench.block, seconds, asked)
-    blocks, why = covering_queue(timing, bench, allowed, delay_s - daq.filter_delay_samples / bench.sample_rate_hz)
+    elsewhere = daq.filter_delay_samples + allowed.buffered_blocks * bench.block
+    blocks, why = covering_queue(timing, bench, allowed, delay_s - elsewhere / bench.sample_rate_hz)
     daq.adjust(blocks)
     return _choice(daq, bench, "measured", blocks, why)
 
@@ -94,8 +95,9 @@ def queue_of(bench: Bench) -> int:
 
 
 def presumed_latency(daq: DAQ, bench: Bench, queue_blocks: int) -> float:
-    """Return the latency in samples as far as known before the device is started: queue, hold and filters."""
-    return queue_blocks * bench.block + HOLD_SAMPLES + daq.filter_delay_samples
+    """Return the latency in samples as far as known before the device is started: queue, buffer, hold and filters."""
+    buffered = daq.adjustable.buffered_blocks if daq.adjustable else 0
+    return (queue_blocks + buffered) * bench.block + HOLD_SAMPLES + daq.filter_delay_samples
 
 
 def _choice(

@@ -27,7 +27,7 @@ def installed(tmp_path, monkeypatch):
 
 
 def test_a_driver_of_an_installed_package_is_found(installed):
-    assert driver_names() == ["box", "can", "serial", "sound", "virtual"]
+    assert driver_names() == ["box", "can", "nidaqmx", "serial", "sound", "virtual"]
     bench = bench_with()
     named = bench.model_copy(update={"driver": bench.driver.model_copy(update={"name": "box"})})
     assert type(make_daq(named)).__name__ == "BoxDAQ"
@@ -40,5 +40,5 @@ def test_a_package_does_not_take_the_name_of_a_shipped_driver(installed):
 def test_an_unknown_name_is_refused_with_those_there_are(installed):
     bench = bench_with()
     named = bench.model_copy(update={"driver": bench.driver.model_copy(update={"name": "bocks"})})
-    with refused(ConfigurationError, "bocks-box-can-serial-sound-virtual", field="driver.name", value="bocks"):
+    with refused(ConfigurationError, "bocks-box-can-nidaqmx-serial-sound-virtual", field="driver.name", value="bocks"):
         make_daq(named)

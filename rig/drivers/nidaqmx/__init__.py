@@ -1,0 +1,1 @@
+"""Devices of NI through NI-DAQmx (package ``nidaqmx``)."""
