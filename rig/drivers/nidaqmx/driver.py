@@ -40,8 +40,8 @@ FLAGS = {OUTPUT_HELD: 1, OUTPUT_CONTINUED: 2, "overload": 4}
 class NiDaqmxDAQ(DAQ):
     """An output and inputs of NI devices on one sample clock, through NI-DAQmx or an NI gRPC Device Server.
 
-    Options: `rig.drivers.nidaqmx.options.NiDaqmxOptions`. Sampling begins with the first `exchange`. A thread that does not wait
-    for the loop keeps the output's buffer filled (`rig.drivers.nidaqmx.buffer`); what lies in it is part of the queue.
+    Options: `rig.drivers.nidaqmx.options.NiDaqmxOptions`. Sampling begins with the first `exchange`. A thread that does not
+    wait for the loop keeps the output's buffer filled (`rig.drivers.nidaqmx.buffer`); what lies in it is part of the queue.
     Not handled: devices that need more than one task of inputs.
     """
 

@@ -187,7 +187,9 @@ def as_ni_error(error: Exception, where: str) -> DaqError:
     if isinstance(error, errors.DaqNotFoundError | errors.DaqNotSupportedError):
         return DaqRefused(NO_DRIVER)
     if isinstance(error, errors.RpcError):
-        return DaqDisconnected(f"the device server does not answer ({error})", where=where)
+        if "UNAVAILABLE" in str(error):
+            return DaqDisconnected(f"the device server does not answer ({error})", where=where)
+        return DaqError(f"the device server has failed ({error})", where=where)
     if not isinstance(error, errors.DaqError):
         return DaqError(f"the driver has failed: {type(error).__name__}: {error}", where=where)
     kind, what = BY_CODE.get(error.error_code, (DaqError, "NI-DAQmx has refused it"))
@@ -234,10 +236,10 @@ class Session:
 
 
 def value_or(read: Callable[[], Any], otherwise: Any) -> Any:
-    """Return an attribute of a device, or something else where the device does not have it."""
-    from nidaqmx.errors import DaqError as NiError
+    """Return an attribute of a device, or something else where the device, NI's driver or the server does not have it."""
+    from nidaqmx.errors import Error
 
     try:
         return read()
-    except NiError:
+    except Error:
         return otherwise

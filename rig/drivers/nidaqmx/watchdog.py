@@ -19,7 +19,7 @@ class DeviceWatchdog:
 
     def __init__(self, session: Session, output: str, timeout_s: float) -> None:
         from nidaqmx.constants import TaskMode, WatchdogAOExpirState
-        from nidaqmx.errors import DaqError as NiError
+        from nidaqmx.errors import Error
         from nidaqmx.system.watchdog import AOExpirationState, WatchdogTask
 
         self.about, self.was_expired = f"0 V after {timeout_s:g} s", False
@@ -32,8 +32,8 @@ class DeviceWatchdog:
             self.was_expired = bool(self._task.expired)
             if self.was_expired:
                 self._task.clear_expiration()
-        except NiError as error:
-            self.about = f"the device has none that could be used (NI-DAQmx {error.error_code})"
+        except Error as error:  # also where NI's driver or the server does not know of watchdogs
+            self.about = f"the device has none that could be used ({str(error).partition(chr(10))[0]})"
             self.close()
 
     def feed(self) -> None:

@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from grpc import StatusCode
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError as NiError, DaqNotFoundError, RpcError
 
@@ -237,7 +238,8 @@ def test_other_errors_are_told_too():
     assert type(unknown) is DaqError
     assert "-12345: Something." in str(unknown)
     assert isinstance(as_ni_error(DaqNotFoundError("none"), ""), DaqRefused)
-    assert isinstance(as_ni_error(RpcError(14, "no server"), "host:1"), DaqDisconnected)
+    assert isinstance(as_ni_error(RpcError(StatusCode.UNAVAILABLE, "no server"), "host:1"), DaqDisconnected)
+    assert type(as_ni_error(RpcError(StatusCode.UNKNOWN, "it broke"), "host:1")) is DaqError
 
 
 def test_a_device_that_is_unplugged_is_told_from_one_that_is_silent():
