@@ -60,8 +60,10 @@ class LoopbackRecord(NamedTuple):
 
     @property
     def usable(self) -> np.ndarray:
-        """bool[n]: samples that were neither lost nor can have been changed by an output that was held."""
-        near = np.convolve(self.held, np.ones(2 * FILTER_SAMPLES + 1))[FILTER_SAMPLES:-FILTER_SAMPLES] > 0.5
+        """bool[n]: samples that are there and cannot have been changed by an output that was held, or lost with its row."""
+        behind = max(0, math.ceil(self.latency_samples) - self.queue_samples)
+        wrong = self.held | self.lost
+        near = np.convolve(wrong, np.ones(2 * FILTER_SAMPLES + behind + 1))[FILTER_SAMPLES:][: wrong.size] > 0.5
         return ~self.lost & ~near
 
     def handed_over(self, instants: np.ndarray) -> np.ndarray:
@@ -73,6 +75,11 @@ class LoopbackRecord(NamedTuple):
         """float64[n]: the outputs, and in place of those that came too late what was put out, V."""
         instead = self.handed_over(np.nan_to_num(self.put_out, nan=0.0))
         return np.where(self.handed_over(np.isfinite(self.put_out)), instead, self.outputs)
+
+
+def delays_of(latency_samples: float, block: int) -> int:
+    """Return the delays that are looked at, samples; a fit takes four times as many samples."""
+    return math.ceil(max(0.0, latency_samples)) + 2 * block + FILTER_SAMPLES
 
 
 class Answer(NamedTuple):
@@ -89,7 +96,7 @@ class Answer(NamedTuple):
     @classmethod
     def of(cls, recorded: LoopbackRecord, column: int, samples: int | None = None) -> "Answer":
         """Least squares over the first ``samples``; what it leaves, over all."""
-        delays = math.ceil(max(0.0, recorded.latency_samples)) + 2 * recorded.block + FILTER_SAMPLES
+        delays = delays_of(recorded.latency_samples, recorded.block)
         outputs, read = recorded.outputs, recorded.read[:, column]
         part = slice(0, None if samples is None else max(samples, 4 * delays))
         columns = [np.concatenate([np.zeros(lag), outputs[: outputs.size - lag]])[part] for lag in range(delays)]
@@ -129,8 +136,8 @@ class LoopbackSteps(DriverUnderTest):
         recorded = []
         for block in blocks:
             with self.loopback_running(block) as daq:
-                delays = math.ceil(max(0.0, daq.latency_samples)) + 2 * block + FILTER_SAMPLES
-                recorded.append(self.record(daq, self.signs(block * -(-(4 * delays + 400) // block))))
+                samples = 4 * delays_of(daq.latency_samples, block) + 400
+                recorded.append(self.record(daq, self.signs(block * -(-samples // block))))
         return recorded
 
     @contextmanager
@@ -174,4 +181,4 @@ class LoopbackSteps(DriverUnderTest):
         flagged = (LOST, sum(bits.values()), bits.get(CONTINUED, 0))
         lost, held, continued = (flags[:end] & mask != 0 for mask in flagged)
         arrays = outputs[:end], read[:end], lost, held, continued, put_out[:end]
-        return LoopbackRecord(*arrays, block, daq.queue_blocks * block, daq.latency_samples, channels)
+        return LoopbackRecord(*arrays, block, daq.queue_samples, daq.latency_samples, channels)

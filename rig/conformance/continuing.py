@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from rig.conformance.answers import FARTHEST, MEDIAN_TO_RMS, Answer, LoopbackRecord, LoopbackSteps
+from rig.conformance.answers import FARTHEST, MEDIAN_TO_RMS, Answer, LoopbackRecord, LoopbackSteps, delays_of
 from rig.conformance.looking import STILL, OutputSteps
 from rig.conformance.subject import has_clock
 from rig.daq import DAQ
@@ -26,8 +26,9 @@ class ContinuingTests(LoopbackSteps, OutputSteps):
         """A host that is late leaves a sine a sine, and the loopback reads what the driver says was put out."""
         with self.loopback_running() as daq:
             pause_s = self._pause_s(daq, PERIOD)
-            fit, blocks = FIT_SAMPLES // daq.block, FIT_SAMPLES // daq.block + SINE_BLOCKS
-            blocks += math.ceil(pause_s * daq.sample_rate_hz / daq.block)
+            samples = max(FIT_SAMPLES, 4 * delays_of(daq.latency_samples, daq.block))
+            fit = FIRST_BLOCKS + math.ceil(samples / daq.block)
+            blocks = fit + SINE_BLOCKS + math.ceil(pause_s * daq.sample_rate_hz / daq.block)
             outputs = self.amplitude_v * np.sin(2.0 * np.pi / PERIOD * np.arange(blocks * daq.block))
             outputs[: fit * daq.block] = self.signs(fit * daq.block)
             outputs[: FIRST_BLOCKS * daq.block] = 0.0  # those that are late after the start are flagged by nobody

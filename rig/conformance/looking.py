@@ -43,7 +43,7 @@ class OutputSteps(DriverUnderTest):
     def driven(self) -> Iterator[DAQ]:
         """A driver with its output at the amplitude, confirmed independently."""
         with self.punctual(), self.make_visible() as daq:
-            daq.start(min(10, daq.capabilities.largest_block))
+            daq.start(min(max(self.blocks), daq.capabilities.largest_block))
             if self.witness(daq) is None and loopback_of(daq) is None:
                 self.unproven(UNSEEN)
             seen = self.drive(daq, self.amplitude_v)

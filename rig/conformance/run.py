@@ -36,7 +36,8 @@ class Finding:
 
 class _OnBench(BenchContract):
     def __init__(self, bench: Bench, output_log: Path | None) -> None:
-        self.bench, self._output_log = bench, output_log
+        self.take(bench)
+        self._output_log = output_log
 
     def witness(self, daq: DAQ | None) -> float | None:
         return super().witness(daq) if self._output_log is None else last_output_v(self._output_log)

@@ -36,8 +36,8 @@ class DriverUnderTest(ABC):
     """Largest output of any test where something physical moves, V."""
     tolerance_v = 0.02
     """Noise of the inputs with 0 V on the output, V RMS."""
-    blocks = (1, 4, 10)
-    """Block sizes that are tried, if the driver allows them."""
+    blocks: tuple[int, ...] = (1, 4, 10)
+    """Block sizes that are tried, if the driver allows them; the largest one in every test that takes more than some blocks."""
 
     prompt_s = 1.0
     """Time that stop and close may take, and that it may take to find out that the device is gone, s."""

@@ -12,4 +12,4 @@ class TestDriver(_Contract):
     @pytest.fixture(autouse=True)
     def _on_the_bench(self, rig_subject: Subject) -> None:
         rig_subject.require_arming()
-        self.bench = rig_subject.bench
+        self.take(rig_subject.bench)

@@ -18,9 +18,12 @@ class WaysOutTests(OutputSteps):
         with self.punctual(), self.make_visible() as daq:
             if self.witness(daq) is None:
                 self.unproven("no witness but the driver's own loopback: a gain of both cancels. Override witness")
-            daq.start(min(10, daq.capabilities.largest_block))
+            daq.start(min(max(self.blocks), daq.capabilities.largest_block))
             for level_v in (self.amplitude_v, -self.amplitude_v, 0.5 * self.amplitude_v):
+                held = daq.counters.get(HELD, 0)
                 seen = self.drive(daq, level_v)
+                if daq.counters.get(HELD, 0) > held:
+                    self.unproven(f"{TOO_BUSY}: outputs came too late")
                 assert seen is not None, "the witness has seen the output at first, and does not any more"
                 assert abs(seen - abs(level_v)) <= STILL * self.amplitude_v, (
                     f"{level_v:g} V were handed over for {daq.queue_blocks + 2} blocks, and {seen:.3g} V are on the output"
@@ -36,7 +39,7 @@ class WaysOutTests(OutputSteps):
                     self.unproven(f"no witness sees the output before the first block: {UNSEEN}")
                 self.require_still(self.look(daq), f"after open {when}")
                 for again in ("", " again"):
-                    daq.start(min(10, daq.capabilities.largest_block))
+                    daq.start(min(max(self.blocks), daq.capabilities.largest_block))
                     self.require_still(self.look(daq), f"after start{again} {when}")
                     self.drive(daq, self.amplitude_v)
                     daq.stop()

@@ -75,7 +75,7 @@ class EmulatorSettings(Configured):
         if self.interface not in (None, "slcan") and self.channel is None:
             raise InputError(f"is missing, interface {self.interface!r} has several", field="channel")
         if self.wire == "sound":
-            for field in ("lockstep", "as_hardware", "faults", "link", "log_output", "interface", "firmware"):
+            for field in ("lockstep", "as_hardware", "faults", "link", "interface", "firmware"):
                 if getattr(self, field):
                     raise InputError("a sound card has none", field=field, value=str(getattr(self, field)))
         if self.firmware is not None and self.faults:

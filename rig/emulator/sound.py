@@ -19,7 +19,7 @@ import numpy as np
 
 from rig.bench import Arming, Bench, DriverChoice
 from rig.bench.channels import Channel
-from rig.emulator.plant import VirtualPlant, Wiring
+from rig.emulator.plant import OutputLog, VirtualPlant, Wiring
 from rig.errors import ConfigurationError, DaqError, DaqRefused
 
 if TYPE_CHECKING:
@@ -109,6 +109,8 @@ def run_sound_card(
         names = tuple(channel.name for channel in bench.channels)
         plant = VirtualPlant(bench, settings.seed, Wiring(names, settings.flip, settings.dead, settings.swap))
         plant.step(np.zeros(client.blocksize))  # compiles
+        if settings.log_output is not None:
+            plant.log = OutputLog(settings.log_output)
         plant.reset()
         card = Card(client, plant)
         with client:

@@ -75,7 +75,7 @@ class SoundDAQ(DAQ):
     @property
     def latency_samples(self) -> float:
         """Queue, both filters, and the delay of the stream: before the start two periods, or what the device promises."""
-        return self._options.queue * self.block + self._filters + self._delay_frames / self._factor
+        return self._queue * self.block + self._filters + self._delay_frames / self._factor
 
     @property
     def filter_delay_samples(self) -> float:
@@ -85,7 +85,19 @@ class SoundDAQ(DAQ):
     @property
     def queue_samples(self) -> int:
         """Queue and interpolation."""
-        return self._options.queue * self.block + self._filters // 2
+        return self._queue * self.block + self._filters // 2
+
+    @property
+    def _queue(self) -> int:
+        """Blocks of the queue: those set; with ``"auto"`` outputs are there at least a period before they are due."""
+        if self._given.queue_blocks != "auto":
+            return self._options.queue
+        return max(self._options.queue, 2 * self._blocks_of_a_period - 1)
+
+    @property
+    def _blocks_of_a_period(self) -> int:
+        """Blocks that the audio system exchanges at once."""
+        return math.ceil(self._options.period_frames / ((self.block or self._bench.block) * self._factor))
 
     @property
     def _filters(self) -> int:
@@ -94,7 +106,7 @@ class SoundDAQ(DAQ):
 
     @property
     def identity(self) -> dict[str, str]:
-        """Device, host interface, rates, and where the latency comes from."""
+        """Device, host interface, rates, where the latency comes from, and the longest period that is continued, samples."""
         if self._device is None:
             return {}
         return {
@@ -103,6 +115,7 @@ class SoundDAQ(DAQ):
             "host_api": self._device.host_api,
             "device_rate_hz": f"{self._rate_hz:g}",
             "latency_from": self._latency_from or "not known before the start",
+            "longest_period": f"{self._longest_period // self._factor}",
         }
 
     @property
@@ -129,7 +142,7 @@ class SoundDAQ(DAQ):
             wire_share={self._bench.block: 0.0},
             largest_wire_share=1.0,
             automatic=self._given.queue_blocks == "auto",
-            longest_period=int(self._longest_period // self._factor),
+            longest_period=self._longest_period // self._factor,
         )
 
     def adjust(self, queue_blocks: int, watchdog_s: float | None = None) -> None:
@@ -220,13 +233,13 @@ class SoundDAQ(DAQ):
         self._device = found(self._options.device, self._options.host_api)  # PortAudio was let go with the last stream
         options, factor = self._options, self._factor
         block, block_s = self.block * factor, self.block / self.sample_rate_hz
-        if (options.queue + 1) * block < options.period_frames:
-            needed = math.ceil(options.period_frames / block) - 1
+        needed = self._blocks_of_a_period - 1
+        if self._queue < needed:
             raise DaqRefused(
                 f"a period of the audio system, {options.period_frames} frames, lasts longer than the queue",
                 field="driver.options.queue_blocks",
                 value=options.queue,
-                allowed=f"from {needed} on",
+                allowed='"auto"' + (f", or from {needed} on" if needed <= LARGEST_QUEUE else ""),
             )
         setting = Setting(
             self._device,
@@ -236,17 +249,18 @@ class SoundDAQ(DAQ):
             options.output,
             options.timeout_s or max(TIMEOUT_S, TIMEOUT_BLOCKS * block_s),
         )
+        self._interpolate, self._decimate = Interpolator(factor), Decimator(factor, len(self.channels))
+        self._decimate(self._interpolate(np.zeros(self.block))[:, None].repeat(len(self.channels), axis=1))  # compiles
         self._stream = stream = DuplexStream(
             setting,
             block=block,
-            ahead=max(options.queue + 8, math.ceil((FRAMES + 8 * options.period_frames) / block) + 1),
+            ahead=max(self._queue + 8, math.ceil((FRAMES + 8 * options.period_frames) / block) + 1),
             longest_period=self._longest_period,
             watchdog=round(self._watchdog_s * self._rate_hz),
             fade=round(options.ramp_s * self._rate_hz),
         )
         self._counted = dict.fromkeys(self._counted, 0)
         self._measure_latency(stream)
-        self._interpolate, self._decimate = Interpolator(factor), Decimator(factor, len(self.channels))
         self._due = -1
 
     def _measure_latency(self, stream: DuplexStream) -> None:
@@ -265,7 +279,7 @@ class SoundDAQ(DAQ):
         assert stream is not None
         if self._due < 0:
             stream.begin()
-            self._due = self._options.queue * self.block * factor
+            self._due = self._queue * self.block * factor
         counts = counts_of(self._interpolate(voltages), self._options.output_full_scale_v or 1.0)
         period, ramp = self.continuation[0].item()
         stream.put(self._due, counts, period_steps(period * factor), ramp_length(ramp * factor))

@@ -96,18 +96,13 @@ def measured_delay(stream: DuplexStream, column: int, amplitude: int, channel: s
 
 def _heard(stream: DuplexStream, column: int, amplitude: int) -> Loopback | None:
     """Put out the signal once; return what comes back of it, None where frames were lost."""
-    block = stream.block
-    sent = np.zeros(-(-FRAMES // block) * block)
-    sent[:LENGTH] = amplitude * signal_of()
-    counts = np.rint(sent).astype(np.int64)
+    counts = np.zeros(FRAMES, np.int64)
+    counts[:LENGTH] = np.rint(amplitude * signal_of())
     stream.begin()
     lead = 4 * stream.period
-    firsts = range(0, counts.size, block)
-    for first in firsts:
-        stream.put(lead + first, counts[first : first + block])
-    rows = [stream.take().inputs[:, column] for _ in firsts]
+    stream.put(lead, counts)
+    read = stream.take(FRAMES).inputs[:, column]
     stream.begin()  # nothing is to come that its watchdog could miss
-    read = np.concatenate(rows)
     if not np.all(np.isfinite(read)):
         return None
     heard = delay_of(counts[:LENGTH].astype(float), read)

@@ -12,6 +12,7 @@ import scipy
 
 from rig.errors import DaqRefused
 from vibrolock.arrays import Float
+from vibrolock.compiled import kernel
 
 PASS_BAND = 0.35
 """Highest frequency that passes unchanged, of the bench's sample rate; chosen: between a short delay and a wide band."""
@@ -47,6 +48,16 @@ def low_pass(factor: int) -> LowPass:
     return LowPass(scipy.signal.firwin(2 * delay * factor + 1, 1.0 / factor, window=("kaiser", beta)), delay)
 
 
+@kernel
+def _weighted(rows: np.ndarray, step: int, weights: np.ndarray, out: np.ndarray) -> None:
+    """Fill ``out[i]`` [columns] with the sum of ``rows[i step + k] weights[k]`` over all k."""
+    out[:] = 0.0
+    for index in range(out.shape[0]):
+        for tap in range(weights.shape[0]):
+            for column in range(out.shape[1]):
+                out[index, column] += rows[index * step + tap, column] * weights[tap, column]
+
+
 class Interpolator:
     """Interpolates blocks of outputs from the bench's rate to the device's, with the state from one block to the next."""
 
@@ -55,7 +66,7 @@ class Interpolator:
         self.delay = filter_.delay
         padded = np.zeros((2 * self.delay + 1) * factor)
         padded[: filter_.taps.size] = factor * filter_.taps
-        self._phases = padded.reshape(2 * self.delay + 1, factor)[::-1]
+        self._phases = padded.reshape(2 * self.delay + 1, factor)[::-1].copy()
         self._before = np.zeros(2 * self.delay)
 
     def __call__(self, samples: Float) -> Float:
@@ -64,7 +75,9 @@ class Interpolator:
             return samples
         both = np.concatenate((self._before, samples))
         self._before = both[samples.size :]
-        return (np.lib.stride_tricks.sliding_window_view(both, self._phases.shape[0]) @ self._phases).ravel()
+        out = np.empty((samples.size, self._factor))
+        _weighted(both[:, None].repeat(self._factor, axis=1), 1, self._phases, out)
+        return out.ravel()
 
 
 class Decimator:
@@ -76,7 +89,7 @@ class Decimator:
     def __init__(self, factor: int, channels: int) -> None:
         self._factor, filter_ = factor, low_pass(factor)
         self.delay = filter_.delay
-        self._taps = filter_.taps
+        self._taps = filter_.taps[:, None].repeat(channels, axis=1)
         self._before = np.zeros((2 * self.delay * factor, channels))
 
     def __call__(self, frames: Float) -> Float:
@@ -85,8 +98,9 @@ class Decimator:
             return frames
         both = np.concatenate((self._before, frames))
         self._before = both[frames.shape[0] :]
-        windows = np.lib.stride_tricks.sliding_window_view(both, self._taps.size, axis=0)
-        return windows[:: self._factor] @ self._taps
+        out = np.empty((frames.shape[0] // self._factor, both.shape[1]))
+        _weighted(both, self._factor, self._taps, out)
+        return out
 
 
 def chosen_rate(bench_hz: float, supported: list[float], asked_hz: float | None, device: str) -> float:

@@ -68,7 +68,7 @@ class DuplexStream:
         self._record["rate_hz"], self._record["watchdog"] = setting.rate_hz, watchdog
         self._record["fade_length"] = max(1, fade)
         self._audio = audio = library()
-        self._sent = self._taken = 0
+        self._sent = self._place = self._taken = 0
         self._is_silent = False
         try:
             self._stream = audio._StreamBase(
@@ -111,27 +111,30 @@ class DuplexStream:
         self._taken = int(self._record["origin"])
 
     def put(self, first: int, counts: Int, period: int = 0, ramp: int = 0) -> None:
-        """Hand over a block of outputs [block], due from frame ``first`` on; how they go on as in `rig.continuation.keep`."""
-        memory, place = self.memory, self._sent * self.block
-        at = place % memory.sent.size
-        memory.sent[at : at + self.block] = counts
-        memory.messages[self._sent % MESSAGES] = first, self.block, place, period, ramp
+        """Hand over outputs [n], due from frame ``first`` on; how they go on as in `rig.continuation.keep`."""
+        memory, size = self.memory, counts.size
+        at = self._place % memory.sent.size
+        if at + size > memory.sent.size:  # a message does not wrap
+            self._place, at = self._place + memory.sent.size - at, 0
+        memory.sent[at : at + size] = counts
+        memory.messages[self._sent % MESSAGES] = first, size, at, period, ramp
         publish(self._record)
         self._sent += 1
+        self._place += size
 
-    def take(self) -> Frames:
-        """Wait for the next block of frames and return it."""
-        record, block = self._record, self.block
+    def take(self, frames: int | None = None) -> Frames:
+        """Wait for the next block of frames, or for so many, and return them."""
+        record, block = self._record, frames or self.block
         self._await(lambda: record["done"] >= self._taken + block)
-        if record["done"] - self._taken > self.memory.flags.size - 2 * self._setting.period:
-            raise DaqOverrun(f"{self._setting.device.text}: the inputs of 2 s have not been fetched in time")
-        rows = np.arange(self._taken, self._taken + block) % self.memory.flags.size
-        self._taken += block
         if record["tripped"]:
             raise DaqWatchdog(
                 f"{self._setting.device.text}: the watchdog has brought the output to 0 V, for no output had come in time "
                 "(driver.options.watchdog_s)"
             )
+        if record["done"] - self._taken > self.memory.flags.size - 2 * self._setting.period:
+            raise DaqOverrun(f"{self._setting.device.text}: the inputs of 2 s have not been fetched in time")
+        rows = np.arange(self._taken, self._taken + block) % self.memory.flags.size
+        self._taken += block
         self._check_rate()
         return Frames(
             self.memory.inputs[rows][:, self._columns].astype(float), self.memory.flags[rows], self.memory.put_out[rows]

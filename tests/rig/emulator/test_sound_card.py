@@ -10,7 +10,10 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+import tomli_w
 
+from rig.conformance.run import OUTCOMES
+from rig.conformance.without_host import KILLING_TEST
 from rig.drivers.virtual import VirtualDAQ
 from rig.emulator.emulated import emulated
 from rig.emulator.sound import RATE_HZ, card_bench
@@ -34,8 +37,8 @@ def _missing():
 
 
 @pytest.fixture
-def card(monkeypatch):
-    """A bench that reaches a card on a server of this test; without JACK the test skips, or fails where it must be there."""
+def server(monkeypatch):
+    """A server of this test's own for the card; without JACK the test skips, or fails where it must be there."""
     missing = _missing()
     if missing and os.environ.get("VIBROLOCK_SOUND") == "required":
         pytest.fail(missing)
@@ -44,6 +47,11 @@ def card(monkeypatch):
     monkeypatch.setenv("JACK_DEFAULT_SERVER", f"vibrolock-{os.getpid()}")
     monkeypatch.setenv("JACK_NO_START_SERVER", "1")
     monkeypatch.setenv("JACK_NO_AUDIO_RESERVATION", "1")
+
+
+@pytest.fixture
+def card(server):
+    """A bench that reaches a card."""
     with emulated(bench_with(), "sound", lockstep=False, options={"queue_blocks": 4, "watchdog_s": 1.0}) as bench:
         yield bench
 
@@ -101,3 +109,34 @@ def test_a_server_that_ends_is_a_device_that_is_gone(card):
     out, _ = host.communicate(timeout=60)
     assert json.loads(out)["error"] in ("DaqDisconnected", "DaqTimeout")
     assert host.returncode == 0
+
+
+REPEATABLE = {
+    "a repeatable device repeats itself",
+    "an output does not show before its latency",
+    "an output shows once its latency is over",
+    "every block size gives the same samples",
+}
+UNSEEN = {
+    "a device that is gone is a daq error and can be closed",  # the test above takes the server away
+    "every channel reads what is known of it",  # tests/contract/test_sound.py knows it
+    "voltages up to the range are put out",  # so does that
+}
+
+
+@pytest.mark.slow
+def test_the_driver_keeps_the_contract_over_jack(server, tmp_path):
+    log, path = tmp_path / "output", tmp_path / "card.toml"
+    options = {"queue_blocks": 31, "watchdog_s": 1.0}  # of a busy machine
+    with emulated(bench_with(), "sound", lockstep=False, log_output=log, options=options) as bench:
+        path.write_text(tomli_w.dumps(bench.model_dump(mode="json", exclude_none=True)))
+        words = ["conformance", "--bench", str(path), "--arm", "--output-log", str(log), "--json"]
+        program = [sys.executable, "-c", "from rig.cli import main; main()", *words]
+        done = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert done.stdout, done.stderr
+    found = json.loads(done.stdout)["tests"]
+    assert [one for one in found if one["outcome"] == "failed"] == []
+    of = {outcome: {one["test"] for one in found if one["outcome"] == outcome} for outcome in OUTCOMES}
+    assert of["not applicable"] == {*REPEATABLE, KILLING_TEST.removeprefix("test_").replace("_", " ")}
+    if busy := of["unproven"] - UNSEEN:
+        pytest.skip(f"this machine was too busy for: {', '.join(sorted(busy))}")

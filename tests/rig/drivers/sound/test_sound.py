@@ -405,6 +405,18 @@ def test_a_queue_shorter_than_a_period_is_refused(card):
     daq.close()
 
 
+@pytest.mark.parametrize("block", [1, 5, 32, 100])
+def test_a_queue_that_is_left_open_covers_a_period_of_the_audio_system(card, block):
+    card()
+    daq = make_daq(bench(12000.0, 32, queue_blocks="auto"))
+    with daq:
+        daq.start(block)
+        for _ in range(200):
+            daq.exchange(np.zeros(block))
+            assert not daq.flags.any()
+        assert daq.queue_samples >= 32
+
+
 def test_two_devices_of_one_name_need_the_host_interface(card):
     made = card()
     made.devices.append(("box", 1, 3, 2))
