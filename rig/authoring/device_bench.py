@@ -1,7 +1,7 @@
 """A bench to begin with for a device that is connected to this computer."""
 
 from rig.bench.configuration import Table
-from rig.drivers.devices import Attached, attached_devices
+from rig.drivers.devices import Attached, Found, attached_devices, ni_devices
 from rig.errors import ConfigurationError
 
 DECIMATION = 4
@@ -15,10 +15,12 @@ BRIEF_LOOPBACK = {"role": "monitor", "unit": "V", "sensitivity_v_per_unit": 1.0,
 def device_named(text: str) -> Attached:
     """Return the connected device that ``DRIVER:NAME`` means, such as ``sound:Scarlett`` or ``serial:/dev/ttyACM0``.
 
+    ``nidaqmx:cDAQ1@host:port`` is a device of an NI gRPC Device Server.
     Raises `ConfigurationError` where there is none, or several, with the names of those there are.
     """
     driver, _, name = text.partition(":")
-    found = attached_devices()
+    name, _, server = name.partition("@") if driver == "nidaqmx" else (name, "", "")
+    found = Found(ni_devices(server), []) if server else attached_devices()
     devices = [f"{one.driver}:{one.name}" for one in found.devices]
     matching = [one for one in found.devices if one.driver == driver and name.casefold() in one.name.casefold()]
     exact = [one for one in matching if one.name == name]

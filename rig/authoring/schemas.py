@@ -116,7 +116,12 @@ def _options_of_drivers() -> dict[str, Schema]:
     del rig["properties"]["seed"]  # is given to the run
     rig["properties"] |= queue["properties"]
     rig["definitions"] |= queue["definitions"]
-    models = {"serial": SerialOptions, "can": CanOptions, "sound": SoundOptions, "nidaqmx": NiDaqmxOptions}
+    models: dict[str, type[BaseModel]] = {
+        "serial": SerialOptions,
+        "can": CanOptions,
+        "sound": SoundOptions,
+        "nidaqmx": NiDaqmxOptions,
+    }
     return {"virtual": rig, **{name: _of(model) for name, model in models.items()}}
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def list_(
     part: Annotated[str | None, typer.Argument(help="A part of a virtual rig, whose keys are printed.")] = None,
     devices: Annotated[
-        bool, typer.Option("--devices", help="Serial ports, CAN interfaces and sound devices of this computer.")
+        bool, typer.Option("--devices", help="Serial ports, CAN interfaces, sound and NI devices of this computer.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:

@@ -56,7 +56,7 @@ def new(
             "--from",
             metavar="MODEL|DEVICE",
             help="Structured model that a rig has as its specimen; or device that a bench names, as `rig list --devices` has "
-            "it: sound:NAME, serial:PORT.",
+            "it: sound:NAME, serial:PORT, nidaqmx:CHASSIS.",
         ),
     ] = None,
     shaker: Annotated[str, typer.Option(help="With --from: a shaker (`rig list`) in place of that of BENCH.")] = "",
@@ -105,13 +105,19 @@ def _bench_of_device(source: str, output: Path, schema_file: Path | None, overwr
     """Write a bench for a connected device, and a file of sensors beside it if there is none yet."""
     from rig.authoring.device_bench import bench_of_device, device_named
     from rig.authoring.new_files import new_file, start
+    from rig.authoring.ni_bench import bench_of_chassis
 
     device = device_named(source)
-    table = bench_of_device(device, start("bench"))
-    beside = new_file("bench", output, schema_file=schema_file, table=table, overwrite=overwrite)
     sensors = output.with_name("sensors.toml")
-    if not sensors.exists():
-        new_file("sensors", sensors)
+    table, known = bench_of_device(device, start("bench")), None
+    if device.driver == "nidaqmx":
+        table, known = bench_of_chassis(device, start("bench"))
+    if known is not None:  # read from the sensors themselves: a file of its own, beside one that is kept by hand
+        sensors = output.with_name(f"{output.stem}-sensors.toml")
+        table["sensors"] = sensors.name
+    beside = new_file("bench", output, schema_file=schema_file, table=table, overwrite=overwrite)
+    if known is not None or not sensors.exists():
+        new_file("sensors", sensors, table=known, overwrite=overwrite)
     print(f"{output}: a bench for {device.name}, checked by {beside}; sensors in {sensors}")
     if device.driver == "sound":
         print("measure its volts, high-passes and latency next: `rig calibrate`")

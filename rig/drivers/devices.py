@@ -38,10 +38,11 @@ class Found(NamedTuple):
 
 
 def attached_devices() -> Found:
-    """Look for serial ports, CAN interfaces and sound devices; a missing package or library is told and ends nothing."""
+    """Look for serial ports, CAN interfaces, sound devices and NI devices; what is missing for it is told and ends nothing."""
     devices: list[Attached] = []
     missing = []
-    for what, look in (("serial ports", _serial), ("CAN interfaces", _can), ("sound devices", _sound)):
+    looks = {"serial ports": _serial, "CAN interfaces": _can, "sound devices": _sound, "NI devices": ni_devices}
+    for what, look in looks.items():
         try:
             with _quiet():
                 devices += look()
@@ -97,4 +98,33 @@ def _sound() -> list[Attached]:
         )
         for device in sound_devices()
         if device.inputs and device.outputs
+    ]
+
+
+def ni_devices(server: str = "") -> list[Attached]:
+    """Return the NI devices of this computer, or of a device server; a chassis with its modules is one.
+
+    Raises `rig.errors.DaqError` where the package, NI's driver or the server is missing.
+    """
+    from rig.drivers.nidaqmx.devices import chassis_of, devices_of
+    from rig.drivers.nidaqmx.library import Session
+
+    session = Session(server)
+    try:
+        _, found = devices_of(session)
+    finally:
+        session.close()
+    return [
+        Attached(
+            "nidaqmx",
+            chassis.name,
+            {
+                "output": next(iter(chassis.outputs)),
+                "inputs": list(chassis.inputs),
+                **({"server": server} if server else {}),
+            },
+            chassis.about,
+            len(chassis.inputs),
+        )
+        for chassis in chassis_of(found)
     ]

@@ -68,3 +68,43 @@ def _device(device: Any) -> NiDevice:
 
 def _channels(read: Callable[[], Any]) -> tuple[str, ...]:
     return tuple(str(name) for name in value_or(lambda: read().channel_names, ()))
+
+
+class Chassis(NamedTuple):
+    """The devices that stand in one chassis, or one device that stands alone."""
+
+    name: str
+    devices: tuple[NiDevice, ...]
+
+    @property
+    def inputs(self) -> dict[str, NiDevice]:
+        """Input channels, and whose they are."""
+        return {name: device for device in self.devices for name in device.inputs}
+
+    @property
+    def outputs(self) -> dict[str, NiDevice]:
+        """Output channels, and whose they are."""
+        return {name: device for device in self.devices for name in device.outputs}
+
+    @property
+    def about(self) -> str:
+        """Its modules, in one line."""
+        return "; ".join(_about(device) for device in self.devices if device.inputs or device.outputs)
+
+
+def chassis_of(devices: list[NiDevice]) -> list[Chassis]:
+    """Return the chassis and single devices that have an input and an output."""
+    names = dict.fromkeys(device.chassis for device in devices)
+    found = [Chassis(name, tuple(device for device in devices if device.chassis == name)) for name in names]
+    return [one for one in found if one.inputs and one.outputs]
+
+
+def _about(device: NiDevice) -> str:
+    facts = []
+    if device.inputs:
+        facts.append(f"{len(device.inputs)} inputs of {device.input_v:g} V")
+        facts += [f"IEPE {device.currents_ma[0]:g} mA"] if device.currents_ma else []
+        facts += ["{:g} to {:g} Hz".format(*device.rates_hz)] if device.rates_hz[1] else []
+    facts += [f"{len(device.outputs)} outputs of {device.output_v:g} V"] if device.outputs else []
+    simulated = " (simulated)" if device.is_simulated else ""
+    return f"{device.name} {device.model}{simulated}: {', '.join(facts)}"
