@@ -19,6 +19,7 @@ import numpy as np
 
 from rig.bench import Arming, Bench, DriverChoice
 from rig.bench.channels import Channel
+from rig.drivers.sound.lost_time import CLOCK, lost_frames
 from rig.emulator.plant import OutputLog, VirtualPlant, Wiring
 from rig.errors import ConfigurationError, DaqError, DaqRefused
 
@@ -41,13 +42,17 @@ LOOPBACK = Channel(name="loopback", role="monitor", unit="V", sensitivity_v_per_
 class Card:
     """A virtual rig between the ports of a JACK client; ports are numbered as the bench's channels, the loopback last.
 
-    It computes a period when the server asks for it. A reading is in full scales of its input.
+    It computes a period when the server asks for it. A reading is in full scales of its input. For the time that the server
+    has lost the rig vibrates on at 0 V, as a real one would.
     """
 
     def __init__(self, client: Any, plant: VirtualPlant) -> None:
-        self.counts = {"periods": 0, "interruptions": 0, "overloads": 0}
+        self.counts = {"periods": 0, "interruptions": 0, "lost_frames": 0, "overloads": 0}
         self.failure: Exception | None = None
         self._client, self._plant = client, plant
+        self._clock, self._frame, self._seen = np.zeros(1, CLOCK)[0], 0, 0
+        self._clock["rate_hz"] = plant.rate_hz
+        lost_frames(np.zeros(1, CLOCK)[0], 0.0, 0, 1, False)  # compiles
         self._drive = client.inports.register("output_1")
         self._sensors = [
             client.outports.register(f"input_{index + 1}_{name}") for index, name in enumerate(plant.names)
@@ -58,6 +63,7 @@ class Card:
 
     def _period(self, frames: int) -> None:
         try:
+            self._pass_lost_time(frames)
             volts = self._plant.output_range_v * np.array(self._drive.get_array(), float)
             counts, flags = self._plant.step(volts)
             for column, port in enumerate(self._sensors):
@@ -68,6 +74,14 @@ class Card:
             self.failure = error
             for port in self._sensors:
                 port.get_array()[:] = 0.0
+
+    def _pass_lost_time(self, frames: int) -> None:
+        interrupted, self._seen = self.counts["interruptions"] > self._seen, self.counts["interruptions"]
+        lost = max(0, lost_frames(self._clock, time.monotonic(), self._frame, frames, interrupted))
+        if lost:
+            self._plant.step(np.zeros(lost))
+            self.counts["lost_frames"] += lost
+        self._frame += lost + frames
 
     def _interrupted(self, _delayed_us: float) -> None:
         self.counts["interruptions"] += 1

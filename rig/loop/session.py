@@ -63,6 +63,7 @@ class LocalSession:
         if not self._settled:
             self.settle_queue()
         self._daq.start(settings.bench.block)
+        self.identity = self._daq.identity  # may say more once it runs
         loop = Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
         if self._realtime or self._daq.wall_clock:
             loop.notes = (NO_PROCESS,)

@@ -195,7 +195,8 @@ class _Run:
             )
             delay = loop.tick.arrays.loop[0]  # samples from an output to the input that responds to it
             lead_samples = float(delay["delay_whole"]) + float(delay["delay_fraction"])
-            execution.run({**information, "about": {**information["about"], "lead_samples": lead_samples}})
+            about: About = {**information["about"], "lead_samples": lead_samples, "device": session.identity}
+            execution.run({**information, "about": about})
         return execution
 
     def further_journal(self) -> JournalWriter:

@@ -193,7 +193,7 @@ class WorkerSession:
         if not self._settled:
             self.settle_queue()
         self._worker.send("start", settings, self._ring_s)
-        latency_samples, layout, remarks = self._worker.receive("started")
+        latency_samples, layout, remarks, self.identity = self._worker.receive("started")
         self._loop = WorkerLoop(self._worker, settings, latency_samples, layout, self._counters, remarks)
         return self._loop
 

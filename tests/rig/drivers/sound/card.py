@@ -39,6 +39,7 @@ class Card:
         self.adc_s = 10.0
         self.fault = ""
         self.slow = 1.0
+        self.lateness_s = 0.0
         self.promised_s = 0.0
         self.stamps = delay / RATE_HZ
         self.drive = None
@@ -118,7 +119,8 @@ class Card:
         here = sent[first : first + frames, 0]
         read[: here.size] = here[:, None] * self.gains[: read.shape[1]]
         written = np.full((frames, self.given["channels"][1]), np.nan, np.float32)
-        times = np.array([self.adc_s, self.adc_s, self.adc_s + self.stamps])
+        times = np.array([self.adc_s, self.adc_s, self.adc_s + self.stamps]) + self.lateness_s
+        self.lateness_s = max(0.0, self.lateness_s - 0.5 * frames / RATE_HZ)
         self.callback(read.ctypes.data, written.ctypes.data, frames, times.ctypes.data, self._status, self.memory)
         self._status = 0
         self.adc_s += frames / RATE_HZ
@@ -130,6 +132,11 @@ class Card:
         self.now_s += frames / RATE_HZ
         self.adc_s += frames / RATE_HZ
         self.put_out = np.concatenate((self.put_out, np.zeros((frames, self.put_out.shape[1]))))
+        self._status = OVERFLOW | UNDERFLOW
+
+    def be_late(self, seconds):
+        """The audio system calls late, by its time stamps too, loses nothing and catches up; it calls that an interruption."""
+        self.lateness_s = seconds
         self._status = OVERFLOW | UNDERFLOW
 
     @property
