@@ -1,4 +1,4 @@
-"""``rig emulate``: a virtual rig behind the wire protocol of a real device, or as a sound card."""
+"""``rig emulate``: a virtual rig behind the wire protocol of a real device, as a sound card, or behind NI devices."""
 
 import json as jsonlib
 import math
@@ -21,7 +21,7 @@ SHORTEST_BLOCK_S = 0.002
 
 def emulate(
     context: typer.Context,
-    wire: Annotated[str, typer.Argument(help="serial, can or sound.")],
+    wire: Annotated[str, typer.Argument(help="serial, can, sound or nidaqmx.")],
     bench: Annotated[str, typer.Option(help="Virtual bench to put behind it: a name or TOML file.")] = "magnet-beam",
     lockstep: Annotated[bool, typer.Option("--lockstep", help="Wait for the host instead of keeping time.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the rig's noise.", min=0)] = 0,
@@ -45,7 +45,7 @@ def emulate(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Put a virtual rig behind a wire, or into a sound card, at the pace of the clock, until Ctrl-C."""
+    """Put a virtual rig behind a wire, into a sound card, or behind NI devices, at the pace of the clock, until Ctrl-C."""
     from rig.bench import load_bench
     from rig.bench.configuration import validated
     from rig.emulator.process import run_emulator
@@ -59,8 +59,8 @@ def emulate(
     _check_bench_file(bench_file)
 
     def when_ready(ready: "Ready") -> None:
-        if wire == "sound":
-            block, text = _sound_bench(behind, bench, ready)
+        if wire in ("sound", "nidaqmx"):
+            block, text = _own_bench(behind, bench, ready)
         else:
             block = _block(behind, ready)
             text = _bench_text(bench, block, ready, as_hardware)
@@ -81,22 +81,23 @@ def emulate(
         print(f"ended: {counts or 'nothing went wrong'}")
 
 
-def _sound_bench(behind: "Bench", name: str, ready: "Ready") -> tuple[int, str]:
-    """Return the block and the text of a bench file that reaches an emulated sound card; it has a channel more."""
+def _own_bench(behind: "Bench", name: str, ready: "Ready") -> tuple[int, str]:
+    """Return the block and the text of a bench file that reaches a device with a rate and channels of its own."""
     import tomli_w
 
-    from rig.emulator.sound import reaching_bench
+    from rig.emulator.emulated import driver_options, reaching
 
-    reaching = reaching_bench(behind, {**ready.options, "queue_blocks": "auto"})
+    options = driver_options(ready.options, lockstep=ready.lockstep)
+    reached = reaching(behind, ready.wire, options | {"queue_blocks": "auto"})
     table = {
         "base": _base(name),
-        "sample_rate_hz": reaching.sample_rate_hz,
-        "block": reaching.block,
-        "driver": reaching.driver.model_dump(),
-        "arming": reaching.arming.model_dump(exclude_unset=True),
-        "channels": [channel.model_dump(exclude_unset=True) for channel in reaching.channels],
+        "sample_rate_hz": reached.sample_rate_hz,
+        "block": reached.block,
+        "driver": reached.driver.model_dump(),
+        "arming": reached.arming.model_dump(exclude_unset=True),
+        "channels": [channel.model_dump(exclude_unset=True) for channel in reached.channels],
     }
-    return reaching.block, f"{WRITTEN}\n{tomli_w.dumps(table)}"
+    return reached.block, f"{WRITTEN}\n{tomli_w.dumps(table)}"
 
 
 def _base(bench: str) -> str:

@@ -36,6 +36,10 @@ def reaching(bench: Bench, wire: str, options: Table) -> Bench:
         from rig.emulator.sound import reaching_bench
 
         return reaching_bench(bench, options)
+    if wire == "nidaqmx":
+        from rig.emulator.nidaqmx.reaching import reaching_bench as chassis_bench
+
+        return chassis_bench(bench, options)
     return bench.model_copy(update={"driver": DriverChoice(name=wire, options=options)})
 
 
@@ -122,7 +126,7 @@ def emulated(
     options: Table | None = None,
     **settings: object,
 ) -> Iterator[Bench]:
-    """Emulate a virtual bench over ``serial``, ``can`` or ``sound`` while the context lasts; gives a bench that reaches it.
+    """Emulate a virtual bench over ``serial``, ``can``, ``sound`` or ``nidaqmx``; gives a bench that reaches it.
 
     ``options`` are further driver options (``queue_blocks``, ``watchdog_s``...), ``settings`` further `EmulatorSettings`.
     """

@@ -16,6 +16,7 @@ from rig.emulator.parameters import LARGEST_BLOCK, described
 from rig.emulator.plant import OutputLog, VirtualPlant, Wiring
 from rig.emulator.ports import device_end, driver_options_of
 from rig.emulator.settings import EmulatorSettings
+from rig.errors import DaqRefused
 from rig.system.privileges import prepare
 
 PRIORITY = 60
@@ -83,6 +84,8 @@ def run_emulator(
     should_end = _ending(parent)
     if settings.wire == "sound":
         return _run_sound_card(settings, when_ready, should_end)
+    if settings.wire == "nidaqmx":
+        return _run_device_server(settings, when_ready, should_end)
     names = tuple(channel.name for channel in settings.bench.channels)
     wiring = Wiring(names, settings.flip, settings.dead, settings.swap)
     plant = VirtualPlant(settings.bench, settings.seed, wiring)
@@ -135,6 +138,22 @@ def _run_sound_card(
         when_ready(Ready("sound", options, False, scheduling, LARGEST_BLOCK))
 
     return run_sound_card(settings, found, should_end)
+
+
+def _run_device_server(
+    settings: EmulatorSettings, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
+) -> dict[str, int]:
+    try:
+        from rig.emulator.nidaqmx.server import run_device_server
+    except ImportError:
+        raise DaqRefused("the package nidaqmx is not installed (pip install 'nidaqmx[grpc]==1.7.*')") from None
+
+    scheduling = _scheduling(settings)
+
+    def found(options: Table) -> None:
+        when_ready(Ready("nidaqmx", options, settings.lockstep, scheduling, LARGEST_BLOCK))
+
+    return run_device_server(settings, found, should_end)
 
 
 def _scheduling(settings: EmulatorSettings) -> str:

@@ -16,8 +16,9 @@ from vibrolock.errors import InputError
 class EmulatorSettings(Configured):
     """A virtual bench behind a wire, and how it behaves there."""
 
-    wire: Literal["serial", "can", "sound"]
-    """The wire protocol it speaks; ``sound``: a sound card, behind a JACK server."""
+    wire: Literal["serial", "can", "sound", "nidaqmx"]
+    """The wire protocol it speaks; ``sound``: a sound card, behind a JACK server; ``nidaqmx``: NI devices, behind a server for
+    NI's own driver."""
     bench: Bench
     """A bench with the virtual driver: the rig behind the wire."""
     seed: int = Field(0, ge=0)
@@ -51,7 +52,10 @@ class EmulatorSettings(Configured):
     node: int = Field(1, ge=0, le=15)
     """CAN: number of the device on its bus."""
     faults: dict[str, Any] = Field(default_factory=dict)
-    """Faults of the device; fields of `Faults`."""
+    """Faults of the device; fields of `Faults`. NI devices: errors of NI-DAQmx by call, such as
+    ``{"ReadAnalogF64": {"code": -200279, "after": 100}}``, with the fields of `rig.emulator.nidaqmx.faults.Injection`."""
+    device_watchdog: bool = False
+    """NI devices: the chassis has a watchdog."""
     firmware: Path | None = None
     """Program of the firmware, built for this computer, or its image for ARM, which QEMU runs."""
 
@@ -68,7 +72,7 @@ class EmulatorSettings(Configured):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         unknown = sorted(set(self.faults) - set(asdict(Faults())))
-        if unknown:
+        if unknown and self.wire != "nidaqmx":
             raise InputError(f"{unknown[0]!r}", field="faults", allowed=asdict(Faults()))
         if self.wire == "serial" and self.interface is not None:
             raise InputError("a serial device has none", field="interface", value=self.interface)
@@ -78,6 +82,10 @@ class EmulatorSettings(Configured):
             for field in ("lockstep", "as_hardware", "faults", "link", "interface", "firmware"):
                 if getattr(self, field):
                     raise InputError("a sound card has none", field=field, value=str(getattr(self, field)))
+        if self.wire == "nidaqmx":
+            for field in ("link", "interface", "firmware"):
+                if getattr(self, field):
+                    raise InputError("NI devices have none", field=field, value=str(getattr(self, field)))
         if self.firmware is not None and self.faults:
             raise InputError(f"{min(self.faults)!r}: a firmware has none", field="faults", allowed="no fault")
         if self.firmware is not None and self.interface not in (None, "slcan"):

@@ -1,0 +1,43 @@
+"""The bench that reaches the emulated NI devices."""
+
+from typing import TYPE_CHECKING
+
+from rig.bench import Bench, DriverChoice
+from rig.emulator.nidaqmx.devices import DELTA_SIGMA_HZ, NI_9234, coerced_hz, system
+
+if TYPE_CHECKING:
+    from rig.bench.configuration import Table
+
+LOWEST_HZ = DELTA_SIGMA_HZ / 4
+"""Lowest sample rate of the bench, Hz: the filters of the inputs delay by 38.4 samples, 3 ms at this rate."""
+BLOCK = 64
+"""Samples in a block, 5 ms at that rate: a block costs two calls of about 1 ms."""
+OUTPUT = "cDAQ1Mod3/ao0"
+"""Output that drives the rig."""
+
+
+def chassis_options(bench: Bench, port: int, *, lockstep: bool) -> "Table":
+    """Driver options that reach the chassis of a server on a port, with the sensors of a virtual bench on its inputs."""
+    sockets = [name for device in system().values() if device.chassis for name in device.channels("ai")]
+    return {
+        "server": f"127.0.0.1:{port}",
+        "output": OUTPUT,
+        "inputs": sockets[: len(bench.channels)],
+        "coupling": "AC",
+        "excitation_ma": 1e3 * NI_9234.iepe_a,
+        "lockstep": lockstep,
+    }
+
+
+def reaching_bench(bench: Bench, options: "Table") -> Bench:
+    """Return the bench that reaches the chassis of a virtual bench: at a rate of its inputs, with blocks of 5 ms.
+
+    Channels that read the output come last, as the next input of the chassis does.
+    """
+    rate_hz = coerced_hz([NI_9234], max(bench.sample_rate_hz, LOWEST_HZ))
+    changes = {
+        "driver": DriverChoice(name="nidaqmx", options=options),
+        "sample_rate_hz": rate_hz,
+        "block": BLOCK,
+    }
+    return bench.model_copy(update=changes)
