@@ -195,7 +195,7 @@ class Facts:
             "SAMP_CLK_TERM": task.text("SAMP_CLK_SRC") or f"{own}/SampleClock",
             "START_TRIG_TERM": task.text("DIG_EDGE_START_TRIG_SRC") or f"{own}/StartTrigger",
             "SAMP_CLK_TIMEBASE_TERM": f"{own}/SampleClockTimebase",
-            "WATCHDOG_HAS_EXPIRED": task.has_expired,
+            "HAS_EXPIRED": task.has_expired,
             "CHANNELS": ", ".join(c.name for c in task.channels),
             "NAME": task.name,
             "DEVICES": ", ".join(device.name for device in task.devices),

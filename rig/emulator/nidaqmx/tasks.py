@@ -216,6 +216,9 @@ class Tasks:
 
     def reserve(self, task: Task) -> None:
         """Take the devices for a task; another task that has them keeps them."""
+        if task.kind == "watchdog":
+            self._reserve_watchdog(task)
+            return
         self.verify(task)
         if task.reserved:
             return
@@ -462,12 +465,18 @@ class Tasks:
         if task.running:
             task.expires_s = self.timeline.clock() + float(task.attributes["TIMEOUT"])  # type: ignore[arg-type]
 
+    def _reserve_watchdog(self, task: Task) -> None:
+        chassis = task.text("timed_by")
+        if not task.reserved and any(other.reserved and self._is_on(other, chassis) for other in self.all.values()):
+            raise NiError(DAQmxErrors.CANT_RESERVE_WATCHDOG_TASK_WHILE_OTHER_TASKS_RESERVED, f"{chassis} is reserved")
+        task.reserved = True
+
     def _start_watchdog(self, task: Task) -> None:
-        if any(other.reserved and self._is_on(other, task.text("timed_by")) for other in self.all.values()):
-            raise NiError(
-                DAQmxErrors.CANT_RESERVE_WATCHDOG_TASK_WHILE_OTHER_TASKS_RESERVED,
-                f"{task.text('timed_by')} is reserved",
-            )
+        """Start a watchdog; nothing else may run on its chassis (cDAQ-9185/9189 user manual, "Watchdog Timer")."""
+        self._reserve_watchdog(task)
+        chassis = task.text("timed_by")
+        if any(other.running and self._is_on(other, chassis) for other in self.all.values()):
+            raise NiError(DAQmxErrors.CANT_RESERVE_WATCHDOG_TASK_WHILE_OTHER_TASKS_RESERVED, f"tasks run on {chassis}")
         task.running = True
         self.control_watchdog(task, WDTTaskAction.RESET_TIMER.value)
 
