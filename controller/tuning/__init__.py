@@ -1,8 +1,7 @@
 """Gain design as pure functions: model of the plant near a mode, control laws, and assessment of the closed loop.
 
-`PlantModel.from_frequency_responses` fits the plant. `hippold_gains`, `exact_phase_law`, `exact_scheduled_law`,
-`frequency_error_law` and `complex_response_law` compute gains. `assess` evaluates given laws; `design_phase_law` chooses the
-gains of a phase law.
+`PlantModel.from_frequency_responses` fits the plant. `hippold_gains`, `exact_phase_law` and `complex_response_law` compute
+gains. `assess` evaluates given laws; `design_phase_law` chooses the gains of a phase law.
 """
 
 from typing import TYPE_CHECKING
@@ -21,9 +20,7 @@ if TYPE_CHECKING:
     from controller.tuning.exact import (
         complex_response_law as complex_response_law,
         exact_phase_law as exact_phase_law,
-        exact_scheduled_law as exact_scheduled_law,
         frequencies_for as frequencies_for,
-        frequency_error_law as frequency_error_law,
     )
     from controller.tuning.hippold import HippoldGains as HippoldGains, hippold_gains as hippold_gains
     from controller.tuning.laws import (
@@ -37,12 +34,10 @@ if TYPE_CHECKING:
     from controller.tuning.loop import (
         ControlLoop as ControlLoop,
         control_loop as control_loop,
-        lag_per_frequency as lag_per_frequency,
     )
     from controller.tuning.noise import (
         LowPassChoice as LowPassChoice,
         low_pass_from_densities as low_pass_from_densities,
-        low_pass_from_noise as low_pass_from_noise,
     )
     from controller.tuning.plant import PlantModel as PlantModel
     from controller.tuning.stability import (

@@ -1,12 +1,11 @@
 """Gains from the exact map of the measured plant: the strongest integral action within a bound on the sensitivity."""
 
 import math
-from collections.abc import Callable, Sequence
-from typing import TypeVar
+from collections.abc import Sequence
 
 import numpy as np
 
-from controller.tuning.laws import ComplexResponseLaw, FrequencyErrorLaw, LinearAmplitudeLaw, PhaseLaw
+from controller.tuning.laws import ComplexResponseLaw, PhaseLaw
 from controller.tuning.loop import ControlLoop
 from controller.tuning.plant import PlantModel
 from vibrolock.arrays import Complex, Float
@@ -18,41 +17,36 @@ def exact_phase_law(
     low_pass_rad_s: float,
     *,
     sensitivity_peak: float = 1.6,
-    lag_deg: float = -90.0,
-    amplitude_law: LinearAmplitudeLaw | None = None,
 ) -> PhaseLaw:
     """Return the phase PI law with the largest ki for which ``max |S| <= sensitivity_peak`` on every plant.
 
     For a given ratio kp/ki the bound ``|1 + g L| >= 1/sensitivity_peak`` is quadratic in the gain g at each frequency. The
     smallest positive root over all frequencies is the largest gain. As g = 0 is stable, every gain below it is stable too.
-    The ratio kp/ki is found by a search.
+    The ratio kp/ki is found by a grid and a bounded scalar search.
     """
-    return _best(plants, low_pass_rad_s, PhaseLaw, sensitivity_peak, lag_deg, amplitude_law)
+    from scipy.optimize import minimize_scalar
 
+    InputError.raise_if(not plants, "none given", field="plants", allowed="at least one")
+    if not 1.0 < sensitivity_peak <= 4.0:
+        raise InputError(field="sensitivity_peak", value=sensitivity_peak, allowed="above 1, up to 4")
+    omega = [frequencies_for(plant) for plant in plants]
+    unit = [
+        ControlLoop(plant, low_pass_rad_s, PhaseLaw(0.0, 1.0)).frequency_loop_gain(1j * w)
+        for plant, w in zip(plants, omega, strict=True)
+    ]
 
-def exact_scheduled_law(
-    plants: Sequence[PlantModel],
-    low_pass_rad_s: float,
-    *,
-    sensitivity_peak: float = 1.6,
-    lag_deg: float = -90.0,
-    amplitude_law: LinearAmplitudeLaw | None = None,
-) -> FrequencyErrorLaw:
-    """Return the PI law on the frequency error with the largest ki within the sensitivity bound; see `exact_phase_law`.
+    def integral(ratio_s: float) -> float:
+        pairs = zip(omega, unit, strict=True)
+        return min(_largest_gain(gain * (1.0 + 1j * w * ratio_s), sensitivity_peak) for w, gain in pairs)
 
-    It is a phase PI law whose gains scale with the measured damping.
-    """
-    return _best(
-        plants, low_pass_rad_s, lambda kp, ki: FrequencyErrorLaw(ki, kp), sensitivity_peak, lag_deg, amplitude_law
-    )
-
-
-def frequency_error_law(low_pass_rad_s: float, *, share: float = 1.0 / 12.0) -> FrequencyErrorLaw:
-    """Return an integral frequency-error law of gain ``share w_LP``.
-
-    A ``share`` of 1/12 suits a coupled pole far from the mode, 1/8 a coupled pole near the mode.
-    """
-    return FrequencyErrorLaw(share * low_pass_rad_s)
+    ratios = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 81) / low_pass_rad_s])
+    values = [integral(ratio) for ratio in ratios]
+    best = int(np.argmax(values))
+    low, high = ratios[max(best - 1, 0)], ratios[min(best + 1, ratios.size - 1)]
+    found = minimize_scalar(lambda ratio: -integral(ratio), bounds=(low, high), method="bounded")
+    ratio = float(found.x) if -found.fun > values[best] else float(ratios[best])
+    ki = integral(ratio)
+    return PhaseLaw(ki * ratio, ki)
 
 
 def complex_response_law(
@@ -76,43 +70,6 @@ def complex_response_law(
 def frequencies_for(plant: PlantModel, n: int = 1500) -> Float:
     """Return modulation frequencies [n] (rad/s) from 1e-4 to 0.5 times the mode's frequency, spaced geometrically."""
     return np.geomspace(1e-4, 0.5, n) * plant.frequency_rad_s
-
-
-Law = TypeVar("Law", PhaseLaw, FrequencyErrorLaw)
-
-
-def _best(
-    plants: Sequence[PlantModel],
-    low_pass_rad_s: float,
-    law_of: Callable[[float, float], Law],
-    sensitivity_peak: float,
-    lag_deg: float,
-    amplitude_law: LinearAmplitudeLaw | None,
-) -> Law:
-    """Return the law with the largest ki over all ratios kp/ki, by a grid and a bounded scalar search."""
-    from scipy.optimize import minimize_scalar
-
-    InputError.raise_if(not plants, "none given", field="plants", allowed="at least one")
-    if not 1.0 < sensitivity_peak <= 4.0:
-        raise InputError(field="sensitivity_peak", value=sensitivity_peak, allowed="above 1, up to 4")
-    omega = [frequencies_for(plant) for plant in plants]
-    unit = [
-        ControlLoop(plant, low_pass_rad_s, law_of(0.0, 1.0), amplitude_law, lag_deg).frequency_loop_gain(1j * w)
-        for plant, w in zip(plants, omega, strict=True)
-    ]
-
-    def integral(ratio_s: float) -> float:
-        pairs = zip(omega, unit, strict=True)
-        return min(_largest_gain(gain * (1.0 + 1j * w * ratio_s), sensitivity_peak) for w, gain in pairs)
-
-    ratios = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 81) / low_pass_rad_s])
-    values = [integral(ratio) for ratio in ratios]
-    best = int(np.argmax(values))
-    low, high = ratios[max(best - 1, 0)], ratios[min(best + 1, ratios.size - 1)]
-    found = minimize_scalar(lambda ratio: -integral(ratio), bounds=(low, high), method="bounded")
-    ratio = float(found.x) if -found.fun > values[best] else float(ratios[best])
-    ki = integral(ratio)
-    return law_of(ki * ratio, ki)
 
 
 def _largest_gain(loop_gain: Complex, sensitivity_peak: float) -> float:

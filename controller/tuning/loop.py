@@ -42,17 +42,6 @@ def envelope(response: Callable[[Complex], Complex], s: Complex, omega: float) -
     return 0.5 * (upper + lower), -0.5j * (upper - lower)
 
 
-def lag_per_frequency(plant: PlantModel, s: ArrayLike, lag_deg: float = -90.0) -> Complex:
-    """Return T(s) in seconds: change of the lag (rad) per change of the oscillator's frequency (rad/s).
-
-    The demodulators' low-pass and the delay are not included.
-    """
-    s = np.atleast_1d(np.asarray(s, np.complex128))
-    omega = plant.lock_frequency_rad_s(lag_deg)
-    difference = envelope(plant.force_per_v, s, omega)[0] - envelope(plant.acceleration_per_v, s, omega)[0]
-    return np.asarray(difference / s, np.complex128)
-
-
 class SlowChanges(NamedTuple):
     """What a plant makes of slow changes at complex frequencies s, before low-pass and delay: the same whatever the law."""
 

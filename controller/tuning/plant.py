@@ -12,7 +12,6 @@ in s, and beta has the powers -2 to 1 of s.
 
 import cmath
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Self
@@ -181,25 +180,6 @@ class PlantModel:
         """Return the known fields as floats and lists of floats, for a table in a plan."""
         values = ((one.name, getattr(self, one.name)) for one in fields(self))
         return {name: _plain(value) for name, value in values if value is not None}
-
-    @classmethod
-    def from_dict(cls, table: Mapping[str, Any]) -> Self:
-        """Return the model from a table made by `to_dict`; standard errors may be missing.
-
-        Raises ValueError if a key is missing or unknown, or if a value has the wrong shape.
-        """
-        names = {f.name for f in fields(cls)}
-        if wrong := sorted(names.symmetric_difference(table) - (set(STANDARD_ERRORS) - set(table))):
-            raise InputError("missing" if wrong[0] in names else "not known", field=f"plant.{wrong[0]}")
-        lengths = {"residual_per_kg": 2, "force_v_n": 4, "acceleration_v_s2_m": 4, "band_hz": 2}
-        values: dict[str, Any] = {}
-        for name, value in table.items():
-            numbers = np.asarray(value, dtype=float)
-            shape = (lengths[name],) if name in lengths else ()
-            if numbers.shape != shape or not np.all(np.isfinite(numbers)):
-                raise InputError(field=f"plant.{name}", value=value, allowed=f"{shape or 'one'} finite number(s)")
-            values[name] = tuple(map(float, numbers)) if shape else float(numbers)
-        return cls(**values)
 
     @classmethod
     def from_frequency_responses(

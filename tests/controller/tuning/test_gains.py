@@ -17,7 +17,6 @@ from controller.tuning import (
     complex_response_law,
     design_phase_law,
     exact_phase_law,
-    exact_scheduled_law,
     hippold_gains,
     unstable_poles,
 )
@@ -100,15 +99,6 @@ def test_the_exact_design_uses_up_its_sensitivity_and_no_ratio_of_gains_gives_mo
     for factor in (0.5, 0.8, 1.25, 2.0):
         more = PhaseLaw(factor * law.proportional_per_s, 1.03 * law.integral_per_s2)
         assert assess(ControlLoop(plant, low_pass, more)).frequency_margins.sensitivity_peak > 1.6
-
-
-def test_scheduled_gains_keep_their_speed_where_fixed_ones_lose_it():
-    friction = plant_of("friction-beam")
-    low_pass = friction.frequency_rad_s / 5
-    damped = friction.at(0.978 * friction.frequency_rad_s, 0.0133)
-    fixed = assess(ControlLoop(damped, low_pass, exact_phase_law([friction], low_pass)))
-    scheduled = assess(ControlLoop(damped, low_pass, exact_scheduled_law([friction, damped], low_pass)))
-    assert fixed.settling.frequency_shift > 5 * scheduled.settling.frequency_shift
 
 
 def test_the_frequency_error_loop_is_that_of_a_known_plant_whatever_the_damping():

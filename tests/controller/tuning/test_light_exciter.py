@@ -58,14 +58,6 @@ def test_the_interval_of_alpha_holds_the_truth_where_no_prior_helps(mass_kg, noi
     assert max(errors) < 3.0
 
 
-def test_a_plan_without_this_error_is_read_and_a_plan_with_it_keeps_it():
-    plant = fitted(0, 0.005, 1e-3)
-    assert PlantModel.from_dict(plant.to_dict()) == plant
-    known = plant.to_dict()
-    del known["force_v_n_std"]
-    assert PlantModel.from_dict(known).force_v_n_std is None
-
-
 @pytest.mark.parametrize("covariance", [np.full((4, 4), np.nan), np.full((4, 4), np.inf), 1e30 * np.eye(4), -np.eye(4)])
 def test_an_alpha_that_the_lines_do_not_determine_has_an_error_far_above_itself(covariance):
     std = _alpha_std(np.array([0.5, 0.0, 0.0, 0.0]), covariance, 1.0)

@@ -76,25 +76,9 @@ def test_another_modal_frequency_moves_the_structure_and_leaves_the_exciter():
     assert moved.lock_frequency_rad_s() == pytest.approx(0.98 * plant.frequency_rad_s, rel=1e-3)
 
 
-def test_a_plant_survives_being_written_to_a_table():
-    plant = plant_of("magnet-beam")
-    assert PlantModel.from_dict(plant.to_dict()) == plant
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"damping_ratio": -0.1}, {"field": "damping_ratio", "value": -0.1}),
-        (
-            {"band_hz": [1.0]},
-            {"says": "band-hz", "field": "plant.band_hz", "value": [1.0]},
-        ),
-        ({"mass": 1.0}, {"says": "not-known", "field": "plant.mass"}),
-    ],
-)
-def test_a_table_that_is_no_plant_is_refused(change, named):
-    with refused(ValueError, **named):
-        PlantModel.from_dict(plant_of("magnet-beam").to_dict() | change)
+def test_a_plant_without_damping_is_refused():
+    with refused(ValueError, field="damping_ratio", value=-0.1):
+        plant_of("magnet-beam").at(damping_ratio=-0.1)
 
 
 def test_a_force_sensor_of_wrong_polarity_is_noticed():

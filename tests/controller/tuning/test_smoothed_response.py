@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controller.tuning import ControlLoop, complex_response_law, frequency_error_law
+from controller.tuning import ControlLoop, FrequencyErrorLaw, complex_response_law
 from tests.controller.tuning.rigs import plant_of
 
 
@@ -10,7 +10,7 @@ def loops(name="friction-beam"):
     plant = plant_of(name)
     w = plant.lock_frequency_rad_s() / 5
     laws = [complex_response_law(plant, w), complex_response_law(plant, w, smoothing_rad_s=w)]
-    return w, [ControlLoop(plant, w, frequency_error_law(w), law) for law in laws]
+    return w, [ControlLoop(plant, w, FrequencyErrorLaw(w / 12), law) for law in laws]
 
 
 def test_the_gain_of_the_loop_falls_by_the_low_pass():

@@ -8,15 +8,15 @@ import pytest
 from controller.tuning import (
     ComplexResponseLaw,
     ControlLoop,
+    FrequencyErrorLaw,
     PhaseLaw,
     assess,
     complex_response_law,
     exact_phase_law,
-    frequency_error_law,
     hippold_gains,
-    lag_per_frequency,
     step_response,
 )
+from controller.tuning.loop import envelope
 from tests.controller.tuning.rigs import RATE_HZ, closed_loop, fluctuation, periodic_state, plant_of, sampled
 
 
@@ -48,8 +48,11 @@ def modulated_lag(name, slow_rad_s, deviation_rad_s):
 @pytest.mark.parametrize(("name", "slow"), [("magnet-beam", (4.0, 12.0)), ("friction-beam", (8.0, 25.0, 70.0))])
 def test_the_map_from_frequency_to_lag_is_that_of_a_small_modulation(name, slow):
     for slow_rad_s in slow:
-        predicted = lag_per_frequency(plant_of(name), 1j * slow_rad_s)[0]
-        predicted *= np.exp(-0.125j * slow_rad_s / RATE_HZ)  # the hold
+        plant, s = plant_of(name), np.array([1j * slow_rad_s])
+        force, response = (
+            envelope(of, s, plant.lock_frequency_rad_s())[0] for of in (plant.force_per_v, plant.acceleration_per_v)
+        )
+        predicted = ((force - response) / s)[0] * np.exp(-0.125j * slow_rad_s / RATE_HZ)  # the hold
         assert modulated_lag(name, slow_rad_s, 0.02) == pytest.approx(predicted, rel=0.02)
 
 
@@ -61,13 +64,13 @@ def loops():
         "frequency error and complex response, friction beam": (
             "friction-beam",
             fast,
-            frequency_error_law(fast),
+            FrequencyErrorLaw(fast / 12),
             complex_response_law(friction, fast),
         ),
         "frequency error and complex response, magnet beam": (
             "magnet-beam",
             slow,
-            frequency_error_law(slow, share=1 / 8),
+            FrequencyErrorLaw(slow / 8),
             complex_response_law(magnet, slow),
         ),
     }
@@ -127,7 +130,7 @@ def test_a_step_response_is_that_of_the_closed_form():
 def test_complex_response_control_with_a_real_gain_swings_on_the_friction_beam():
     plant = plant_of("friction-beam", held=True)
     low_pass = plant.frequency_rad_s / 5
-    law, right = frequency_error_law(low_pass), complex_response_law(plant, low_pass)
+    law, right = FrequencyErrorLaw(low_pass / 12), complex_response_law(plant, low_pass)
     wrong = ComplexResponseLaw(right.proportional.real, right.integral_per_s)
     for amplitude_law, dies in ((right, True), (wrong, False)):
         assert assess(ControlLoop(plant, low_pass, law, amplitude_law)).stable == dies
