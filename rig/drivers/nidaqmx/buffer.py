@@ -72,7 +72,7 @@ def _continue(source: Record, ring: np.ndarray, first: int, out: np.ndarray, v_p
 class BufferThread:
     """Exchanges blocks with a device in a thread of its own; the first `hand_over` starts both.
 
-    ``feed`` is called with each block.
+    ``feed`` is called before the start and with each block.
     """
 
     def __init__(self, stream: Stream, plan: Plan, feed: Callable[[], None] | None = None) -> None:
@@ -150,6 +150,8 @@ class BufferThread:
 
     def _run(self) -> None:
         try:
+            if self._feed is not None:
+                self._feed()  # a watchdog is started before the tasks run
             self._stream.start()
             while not self._is_silent():
                 self._exchange()

@@ -143,6 +143,7 @@ class Tasks:
             task.export_signals.samp_clk_output_term = options.export_clock
         task.control(constants.TaskMode.TASK_COMMIT)
         self._reader = stream_readers.AnalogMultiChannelReader(task.in_stream)
+        self._reader.verify_array_shape = False  # would ask the device for the number of channels in every call
 
     def _make_output(self) -> None:
         from nidaqmx import constants, stream_writers
@@ -164,6 +165,7 @@ class Tasks:
             source = options.output_trigger or inputs.triggers.start_trigger.term
             task.triggers.start_trigger.cfg_dig_edge_start_trig(source)
         self._writer = stream_writers.AnalogSingleChannelWriter(task.out_stream, auto_start=False)
+        self._writer.verify_array_shape = False
         self._writer.write_many_sample(np.zeros((setting.ahead + 1) * setting.block), self._timeout_s)
         task.control(constants.TaskMode.TASK_COMMIT)
 
