@@ -114,7 +114,9 @@ class SamplesTests(DriverUnderTest):
             if not daq.capabilities.repeatable:
                 self.skip("the device does not repeat itself, so that two runs cannot be compared")
             block = min(block, daq.capabilities.largest_block)
-            steps = int(daq.sample_rate_hz * 0.02) // block + 1
+            daq.start(block)
+            steps = int(daq.sample_rate_hz * 0.02 + daq.latency_samples) // block + 1
+            daq.stop()
             quiet, driven = (self._answer(daq, block, steps, level) for level in (0.0, self.amplitude_v))
             daq.start(block)
             changed = np.flatnonzero((quiet != driven).any(axis=1))

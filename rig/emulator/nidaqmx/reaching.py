@@ -23,8 +23,8 @@ def chassis_options(bench: Bench, port: int, *, lockstep: bool) -> "Table":
         "server": f"127.0.0.1:{port}",
         "output": OUTPUT,
         "inputs": sockets[: len(bench.channels)],
-        "coupling": "AC",
-        "excitation_ma": 1e3 * NI_9234.iepe_a,
+        "coupling": ["DC" if channel.loopback else "AC" for channel in bench.channels],
+        "excitation_ma": [0.0 if channel.loopback else 1e3 * NI_9234.iepe_a for channel in bench.channels],
         "lockstep": lockstep,
     }
 
