@@ -33,6 +33,17 @@ def emulate(
     flip: Annotated[list[str] | None, typer.Option(help="Channel whose sensor sits the wrong way round.")] = None,
     dead: Annotated[list[str] | None, typer.Option(help="Channel that is connected to nothing.")] = None,
     swap: Annotated[list[str] | None, typer.Option(metavar="A,B", help="Two channels in each other's sockets.")] = None,
+    high_pass_hz: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--high-pass",
+            help="Sound: corner of the high-passes of output and inputs, Hz; given several times, of the output and each "
+            "input. None by default: then the written bench needs no calibration.",
+        ),
+    ] = None,
+    cables: Annotated[
+        bool, typer.Option("--cables", help="Sound: a cable from the output to every input, as `rig calibrate` needs.")
+    ] = False,
     interface: Annotated[str | None, typer.Option(help="CAN: python-can's; slcan over a port if left out.")] = None,
     channel: Annotated[str | None, typer.Option(help="CAN: channel of that interface.")] = None,
     fd: Annotated[bool, typer.Option("--fd/--classic", help="CAN: frames of up to 64 or 8 bytes.")] = True,

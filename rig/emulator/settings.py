@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -51,6 +51,11 @@ class EmulatorSettings(Configured):
     """CAN FD: bit rate within the data, bit/s."""
     node: int = Field(1, ge=0, le=15)
     """CAN: number of the device on its bus."""
+    high_pass_hz: tuple[Annotated[float, Field(ge=0, le=100)], ...] = ()
+    """Sound: corners of the high-passes of the output and of each input, Hz, or one corner for all; by default there are
+    none, so that the bench that reaches the card is right before it is calibrated."""
+    cables: bool = False
+    """Sound: every input is connected to the output by a cable, as for a calibration, and the rig to nothing."""
     faults: dict[str, Any] = Field(default_factory=dict)
     """Faults of the device; fields of `Faults`. NI devices: errors of NI-DAQmx by call, such as
     ``{"ReadAnalogF64": {"code": -200279, "after": 100}}``, with the fields of `rig.emulator.nidaqmx.faults.Injection`."""
@@ -82,6 +87,10 @@ class EmulatorSettings(Configured):
             for field in ("lockstep", "as_hardware", "faults", "link", "interface", "firmware"):
                 if getattr(self, field):
                     raise InputError("a sound card has none", field=field, value=str(getattr(self, field)))
+        else:
+            for field in ("high_pass_hz", "cables"):
+                if getattr(self, field):
+                    raise InputError("is for a sound card", field=field, value=str(getattr(self, field)))
         if self.wire == "nidaqmx":
             for field in ("link", "interface", "firmware"):
                 if getattr(self, field):

@@ -3,7 +3,8 @@
 The server is real (Debian's ``jackd2``), its back end is a clock without hardware. A server that is running already is used as
 it is; otherwise one is started, and ended with the emulator. It waits for its clients (``-S``): a rig that is left out for a
 period would see a step that no cable makes. Card and driver are in one graph of JACK: an output comes back in the inputs two
-periods later.
+periods later. Audio inputs and outputs pass no direct voltage: high-passes are emulated on request, first order, at the card's
+rate, behind the converters.
 """
 
 import os
@@ -11,17 +12,19 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
 from rig.bench import Arming, Bench, DriverChoice
 from rig.bench.channels import Channel
 from rig.drivers.sound.lost_time import CLOCK, lost_frames
 from rig.emulator.plant import OutputLog, VirtualPlant, Wiring
 from rig.errors import ConfigurationError, DaqError, DaqRefused
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from rig.bench.configuration import Table
@@ -39,14 +42,49 @@ LOOPBACK = Channel(name="loopback", role="monitor", unit="V", sensitivity_v_per_
 """Channel that the output is connected to."""
 
 
+class HighPasses:
+    """A first-order high-pass for each column, by the bilinear transform; one with a corner of 0 Hz passes everything."""
+
+    def __init__(self, corners_hz: Sequence[float], rate_hz: float) -> None:
+        self._filters = {
+            column: scipy.signal.butter(1, corner, "high", fs=rate_hz)
+            for column, corner in enumerate(corners_hz)
+            if corner
+        }
+        self._states = np.zeros((len(corners_hz), 1))
+
+    def __call__(self, signals: Float) -> None:
+        """Filter the next samples [n, n_columns] in place."""
+        for column, (b, a) in self._filters.items():
+            signals[:, column], self._states[column] = scipy.signal.lfilter(
+                b, a, signals[:, column], zi=self._states[column]
+            )
+
+
 class Card:
     """A virtual rig between the ports of a JACK client; ports are numbered as the bench's channels, the loopback last.
 
     It computes a period when the server asks for it. A reading is in full scales of its input. For the time that the server
-    has lost the rig vibrates on at 0 V, as a real one would.
+    has lost the rig vibrates on at 0 V, as a real one would. ``high_pass_hz``: corners of the output and of each input, one for
+    all, or none. With ``cables`` the rig is disconnected, and every input reads the output.
+
+    Raises `ConfigurationError` for another number of corners.
     """
 
-    def __init__(self, client: Any, plant: VirtualPlant) -> None:
+    def __init__(
+        self, client: Any, plant: VirtualPlant, high_pass_hz: Sequence[float] = (), cables: bool = False
+    ) -> None:
+        ends = 1 + len(plant.names)
+        if len(high_pass_hz) not in (0, 1, ends):
+            raise ConfigurationError(
+                field="high_pass_hz",
+                value=list(high_pass_hz),
+                allowed=f"one corner, or {ends}: of the output, {', '.join(plant.names)}",
+            )
+        corners_hz = high_pass_hz if len(high_pass_hz) == ends else [*(high_pass_hz or [0.0])] * ends
+        self._of_output = HighPasses(corners_hz[:1], client.samplerate)
+        self._of_inputs = HighPasses(corners_hz[1:], client.samplerate)
+        self._cables = cables
         self.counts = {"periods": 0, "interruptions": 0, "lost_frames": 0, "overloads": 0}
         self.failure: Exception | None = None
         self._client, self._plant = client, plant
@@ -65,9 +103,14 @@ class Card:
         try:
             self._pass_lost_time(frames)
             volts = self._plant.output_range_v * np.array(self._drive.get_array(), float)
+            self._of_output(volts[:, None])
             counts, flags = self._plant.step(volts)
-            for column, port in enumerate(self._sensors):
-                port.get_array()[:] = counts[:, column] * self._per_count[column]
+            readings = counts * self._per_count
+            if self._cables:
+                readings[:], flags = readings[:, -1:], 0
+            self._of_inputs(readings)
+            for port, reading in zip(self._sensors, readings.T, strict=True):
+                port.get_array()[:] = reading
             self.counts["periods"] += 1
             self.counts["overloads"] += bool(flags)
         except Exception as error:
@@ -126,7 +169,7 @@ def run_sound_card(
         if settings.log_output is not None:
             plant.log = OutputLog(settings.log_output)
         plant.reset()
-        card = Card(client, plant)
+        card = Card(client, plant, settings.high_pass_hz, settings.cables)
         with client:
             options: Table = {
                 "device": NAME,

@@ -117,7 +117,7 @@ class Card:
         sent = np.concatenate((np.zeros((self.delay, 1)), self.put_out[:, self.output : self.output + 1]))
         first = self.put_out.shape[0]
         here = sent[first : first + frames, 0]
-        read[: here.size] = here[:, None] * self.gains[: read.shape[1]]
+        read[: here.size] = self.readings(here)[:, : read.shape[1]]
         written = np.full((frames, self.given["channels"][1]), np.nan, np.float32)
         times = np.array([self.adc_s, self.adc_s, self.adc_s + self.stamps]) + self.lateness_s
         self.lateness_s = max(0.0, self.lateness_s - 0.5 * frames / RATE_HZ)
@@ -125,6 +125,10 @@ class Card:
         self._status = 0
         self.adc_s += frames / RATE_HZ
         self.put_out = np.concatenate((self.put_out, written))
+
+    def readings(self, sent):
+        """What the inputs read [n, inputs] of outputs [n] that have arrived, in full scales."""
+        return sent[:, None] * self.gains
 
     def lose(self, periods):
         """The audio system does not call for some periods; the output is 0 V meanwhile."""
