@@ -119,6 +119,8 @@ def _bench_of_device(source: str, output: Path, schema_file: Path | None, overwr
     if known is not None or not sensors.exists():
         new_file("sensors", sensors, table=known, overwrite=overwrite)
     print(f"{output}: a bench for {device.name}, checked by {beside}; sensors in {sensors}")
+    if device.driver != "sound":
+        print(table["description"])
     if device.driver == "sound":
         print("measure its volts, high-passes and latency next: `rig calibrate`")
 

@@ -99,6 +99,12 @@ class Connection:
             self.round_trips.add(self.clock() - began)
         self.latched = self._what_has_latched()
 
+    def ask(self) -> DeviceFacts:
+        """Find the device, and return what it says of itself, whatever a bench says."""
+        self._find()
+        negotiate(self.dialogue)
+        return read_facts(self.dialogue)
+
     def _agree(self, bench: Bench, latest: int) -> DeviceFacts:
         negotiate(self.dialogue, latest)
         self.facts = facts = read_facts(self.dialogue)

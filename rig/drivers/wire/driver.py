@@ -48,6 +48,15 @@ class WireDAQ(DAQ):
     def _make_link(self) -> Link:
         """A link to the device, not yet open."""
 
+    def ask(self) -> DeviceFacts:
+        """Open the device, return what it says of itself, and close it; its channels need not be those of the bench."""
+        connection = Connection(self._make_link(), self.clock)
+        try:
+            connection.link.open()
+            return connection.ask()
+        finally:
+            connection.close()
+
     @property
     def _facts(self) -> DeviceFacts | None:
         return self._connection.facts if self._connection else None

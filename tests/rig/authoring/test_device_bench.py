@@ -6,9 +6,13 @@ import tomllib
 import can
 import pytest
 
+from rig.authoring.device_bench import _roles
 from rig.bench import load_bench
+from rig.drivers import make_daq
+from rig.emulator.emulated import emulated
 from rig.wire.serial import port
 from tests.rig.drivers.sound.card import Card
+from tests.rig.rigs import bench_with
 
 
 @pytest.fixture
@@ -56,6 +60,41 @@ def test_a_bench_begins_from_a_port_and_leaves_sensors_that_are_there(computer, 
     command("new", "bench", "--from", "serial:/dev/ttyACM0", "-o", "bench.toml").succeeded()
     assert load_bench("bench.toml").driver.options == {"port": "/dev/ttyACM0"}
     assert (tmp_path / "sensors.toml").read_text() == "# mine\n"
+
+
+def test_a_device_on_a_wire_says_its_channels_ranges_and_rates(computer, command, monkeypatch):
+    with emulated(bench_with()) as reaching:
+        name = str(reaching.driver.options["port"])
+        monkeypatch.setattr(port, "port_names", lambda: [name])
+        said = command("new", "bench", "--from", f"serial:{name}", "-o", "bench.toml").succeeded().out
+        bench = load_bench("bench.toml")
+        with make_daq(bench) as daq:  # which refuses channels, ranges and rates that are not the device's
+            assert not [remark for remark in daq.remarks if "channel" in remark]
+    assert "vibrolock emulator" in said
+    assert [(channel.name, channel.role) for channel in bench.channels] == [
+        (channel.name, channel.role) for channel in reaching.channels
+    ]
+    assert bench.sample_rate_hz == 5000.0
+    assert bench.output_range_v == 10.0
+    assert {channel.range_v for channel in bench.channels} == {10.0}
+
+
+def test_a_device_that_does_not_answer_leaves_examples_and_says_so(computer, command):
+    said = command("new", "bench", "--from", "serial:/dev/ttyACM0", "-o", "bench.toml").succeeded().out
+    assert "did not say its own" in said
+    assert "did not say its own" in load_bench("bench.toml").description
+
+
+@pytest.mark.parametrize(
+    ("names", "roles"),
+    [
+        (("a", "b", "c"), ["force", "drive", "response"]),
+        (("drive", "x", "force", "loopback"), ["drive", "response", "force", "monitor"]),
+        (("x", "drive", "y"), ["force", "drive", "response"]),
+    ],
+)
+def test_roles_are_those_of_names_or_of_the_order(names, roles):
+    assert _roles(names) == roles
 
 
 @pytest.mark.parametrize("name", ["sound:other", "tdms:box", "sound"])
