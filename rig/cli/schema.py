@@ -103,7 +103,7 @@ def new(
 
 def _bench_of_device(source: str, output: Path, schema_file: Path | None, overwrite: bool) -> None:
     """Write a bench for a connected device, and a file of sensors beside it if there is none yet."""
-    from rig.authoring.device_bench import bench_of_device, device_named
+    from rig.authoring.device_bench import ON_A_WIRE, bench_of_device, device_named
     from rig.authoring.new_files import new_file, start
     from rig.authoring.ni_bench import bench_of_chassis
 
@@ -119,7 +119,7 @@ def _bench_of_device(source: str, output: Path, schema_file: Path | None, overwr
     if known is not None or not sensors.exists():
         new_file("sensors", sensors, table=known, overwrite=overwrite)
     print(f"{output}: a bench for {device.name}, checked by {beside}; sensors in {sensors}")
-    if device.driver != "sound":
+    if device.driver in ON_A_WIRE:
         print(table["description"])
     if device.driver == "sound":
         print("measure its volts, high-passes and latency next: `rig calibrate`")

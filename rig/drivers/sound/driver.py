@@ -58,7 +58,7 @@ class SoundDAQ(DAQ):
         self._rate_hz, self._factor = bench.sample_rate_hz, 1
         self._stream: DuplexStream | None = None
         self._delay_frames = 0.0
-        self._latency_from = ""
+        self._loopback = next((at for at, channel in enumerate(bench.channels) if channel.loopback), None)
         self._interpolate, self._decimate = Interpolator(1), Decimator(1, 1)
         self._due = 0
         self._counted = dict.fromkeys((*FLAGS, "lost_samples"), 0)
@@ -114,14 +114,21 @@ class SoundDAQ(DAQ):
             "model": self._device.name,
             "host_api": self._device.host_api,
             "device_rate_hz": f"{self._rate_hz:g}",
-            "latency_from": self._latency_from or "not known before the start",
+            "latency_from": "time stamps"
+            if self._loopback is None
+            else f"loopback channel {self.channels[self._loopback].name}",
             "longest_period": f"{self._longest_period // self._factor}",
         }
 
     @property
+    def statistics(self) -> dict[str, float]:
+        """Delay of the stream from output to input at this start."""
+        return {"stream_delay_frames": self._delay_frames}
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What to know of the latency."""
-        if self._latency_from != "time stamps":
+        if self._loopback is not None:
             return ()
         return (
             "the latency comes from the device's time stamps, which many drivers get wrong by a period: connect the output to "
@@ -264,15 +271,13 @@ class SoundDAQ(DAQ):
         self._due = -1
 
     def _measure_latency(self, stream: DuplexStream) -> None:
-        column = next((at for at, channel in enumerate(self.channels) if channel.loopback), None)
+        column = self._loopback
         if column is None:
-            self._delay_frames, self._latency_from = stream.latency_s * self._rate_hz, "time stamps"
+            self._delay_frames = stream.latency_s * self._rate_hz
             return
         largest_v = TEST_SIGNAL * self._bench.limits.voltage_v
         amplitude = max(16, round(FULL_SCALE * largest_v / (self._options.output_full_scale_v or 1.0)))
-        name = self.channels[column].name
-        self._delay_frames = measured_delay(stream, column, amplitude, name)
-        self._latency_from = f"loopback channel {name}"
+        self._delay_frames = measured_delay(stream, column, amplitude, self.channels[column].name)
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
         stream, factor = self._stream, self._factor
