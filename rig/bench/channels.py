@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 UNITS = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}
 """Unit of a channel by its role; a monitor has any."""
+LEAST_REMAINDER = 1e-3
+"""What is left of 1 less the product of two tangents near a quarter turn, which no single high-pass reaches; chosen."""
 DATE = r"^(\d{4}-\d{2}-\d{2})?$"
 """Pattern of a day, or of no day."""
 SAME = 1e-9
@@ -93,6 +95,9 @@ class Channel(Configured):
     """Corner of the first-order high-pass of sensor and conditioner, Hz: 0.16 divided by the discharge time constant in
     seconds. Its phase is taken out of the loop's, its gain and phase out of the harmonics of every steady vibration, out of
     multisines and out of sweeps; not out of the samples of settled points that a model is fitted to. 0 for none."""
+    input_high_pass_hz: float = Field(0.0, ge=0, le=100)
+    """Corner of the first-order high-pass of the device's input, Hz, which audio interfaces have and ``rig calibrate``
+    measures; taken out as that of the sensor. 0 for none."""
     sensor: str = ""
     """Make and model, for the record."""
     serial_number: str = ""
@@ -178,6 +183,14 @@ class Channel(Configured):
     def resolution_in_unit(self) -> float:
         """Step of the converter in the physical unit."""
         return self.resolution_v / abs(self.sensitivity_v_per_unit)
+
+    def corner_hz(self, frequency_hz: float) -> float:
+        """Return the corner, Hz, of one high-pass that leads by as much, at a frequency, as sensor and input together.
+
+        It is the tangent of the sum of two angles; they must be a quarter turn at most, and near one the corner is bounded.
+        """
+        product = self.high_pass_hz * self.input_high_pass_hz / frequency_hz**2
+        return (self.high_pass_hz + self.input_high_pass_hz) / max(1.0 - product, LEAST_REMAINDER)
 
     @property
     def negligible_amplitude(self) -> float:

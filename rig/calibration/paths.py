@@ -6,10 +6,10 @@ The response of input i to the output is modelled as
 
 with a gain g_i, a delay d_i of samples beyond the latency, the corner f_o of the output's high-pass and f_i of the input's. The
 gains follow linearly from the rest (variable projection; Golub and Pereyra, 1973), which `scipy.optimize.least_squares` fits.
-Corners of inputs that are all alike cannot be told from the output's; for their phases against each other that does not matter.
+Where all inputs are alike, their corner and the output's may change places: no cable tells which is whose (`Paths.exchanged`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -18,6 +18,8 @@ from vibrolock.arrays import Complex, Float
 
 CONNECTED = 0.1
 """Gain, over the largest one, from which on an input counts as connected; chosen: crosstalk of audio devices is below 0.003."""
+ALIKE = 0.02
+"""Relative difference of corners up to which inputs are alike; chosen: what noise leaves uncertain."""
 LARGEST_CORNER_HZ = 100.0
 """Largest corner, Hz, as of a channel of a bench."""
 LARGEST_DELAY = 100.0
@@ -48,6 +50,23 @@ class Paths:
     output_high_pass_hz: float
     """Corner of the output's high-pass, Hz."""
     inputs: tuple[InputPath, ...]
+
+    @property
+    def are_alike(self) -> bool:
+        """Whether the inputs' corners are one."""
+        corners_hz = [one.high_pass_hz for one in self.connected]
+        return max(corners_hz) - min(corners_hz) <= ALIKE * max(corners_hz)
+
+    def exchanged(self, output_hz: float) -> "Paths":
+        """Return the paths with the corners of output and inputs exchanged, if these are alike and nearer to the output's."""
+        if not self.connected or not self.are_alike:
+            return self
+        of_inputs = sum(one.high_pass_hz for one in self.connected) / len(self.connected)
+        if abs(self.output_high_pass_hz - output_hz) <= abs(of_inputs - output_hz):
+            return self
+        ours = self.output_high_pass_hz
+        inputs = [replace(one, high_pass_hz=ours) if one.connected else one for one in self.inputs]
+        return Paths(of_inputs, tuple(inputs))
 
     @property
     def connected(self) -> tuple[InputPath, ...]:

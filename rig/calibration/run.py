@@ -10,8 +10,8 @@ import tomli_w
 
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench, load_bench
-from rig.bench.configuration import Table
-from rig.calibration.paths import InputPath, Paths, fitted_paths
+from rig.bench.configuration import Table, read_toml
+from rig.calibration.paths import InputPath, Paths, fitted_paths, high_pass
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import spectra_of
@@ -24,8 +24,14 @@ PURPOSE = "calibration"
 """Purpose of the recording, in the facts of its parts."""
 SHARE = 0.1
 """RMS of the multisine by default, of the largest voltage that limits and ranges allow with the cables; chosen."""
-RESOLUTION_HZ = 0.5
-"""Distance of the lines, Hz; chosen: a period of two seconds."""
+LARGEST_RESOLUTION_HZ = 5.0
+"""Largest distance of the lines, Hz; chosen: a multimeter averages over a period of 0.2 s, and its reading is steady."""
+LEAST_LINES = 40
+"""Least number of lines in the band; chosen."""
+SETTLING_S = 2.0
+"""Time before the measurement, s; chosen: by then a high-pass of 1 Hz has forgotten the start."""
+VOLTS = ("output_full_scale_v", "input_full_scale_v")
+"""Options of the driver that hold volts per full scale."""
 HIGHEST_SHARE = 0.3
 """Highest line, of the sample rate; chosen: below what filters between two rates bend."""
 LEAST_COHERENCE = 0.999
@@ -42,16 +48,62 @@ class Calibrated:
     bench: Bench
     """The bench that was played on: without what is to be found."""
     rms_v: float
-    """RMS of the output by the bench's volts, V."""
+    """RMS of the output by the bench's volts, before its high-pass, V."""
+    passed_rms_v: float
+    """RMS behind the high-pass of the output, V."""
     recording: Path
     latency_from: str
     """Where the latency comes from, by the driver; empty if it does not say."""
 
+    @property
+    def reference(self) -> InputPath:
+        """The input whose delay and polarity the others are compared with: the loopback channel's, or the first connected."""
+        loopbacks = {channel.name for channel in self.bench.channels if channel.loopback}
+        connected = self.paths.connected
+        return next((one for one in connected if one.name in loopbacks), connected[0])
+
+    @property
+    def uncertain_gain(self) -> float:
+        """Relative error of all amplitudes at the specimen's frequency if the output's corner is the inputs', and they its.
+
+        0 unless the inputs are alike: their gains and phases against each other are right in any case.
+        """
+        if not self.paths.are_alike:
+            return 0.0
+        at = np.array([self.bench.specimen.linear_frequency_hz])
+        ours, other = self.paths.connected[0].high_pass_hz, self.paths.output_high_pass_hz
+        return float(abs(abs(high_pass(at, ours)[0] / high_pass(at, other)[0]) - 1.0))
+
+
+def begun_from(path: Path) -> tuple[Path, Bench]:
+    """Return the bench that a calibration begins from, and its file: for one that a calibration wrote, its base with its volts.
+
+    Raises `ConfigurationError` where it cannot be loaded.
+    """
+    bench = load_bench(path)
+    table = read_toml(path)
+    own = table.get("driver", {})
+    if not isinstance(own, dict) or "calibrated" not in own.get("options", {}):
+        return path, bench
+    base = path.parent / str(table["base"])
+    begun = load_bench(base)
+    volts = {name: bench.driver.options[name] for name in VOLTS if name in bench.driver.options}
+    driver = begun.driver.model_copy(update={"options": {**begun.driver.options, **volts}})
+    return base, begun.model_copy(update={"driver": driver})
+
 
 def calibrate(
-    bench: Bench, recording: Path, options: RunOptions, *, rms_v: float | None = None, seconds: float = 10.0
+    bench: Bench,
+    recording: Path,
+    options: RunOptions,
+    *,
+    rms_v: float | None = None,
+    seconds: float = 10.0,
+    output_high_pass_hz: float | None = None,
 ) -> Calibrated:
     """Play a multisine and fit the paths. The output is connected to the inputs by cables, and to nothing else.
+
+    ``output_high_pass_hz``: the output's corner, Hz, as far as known, which says whose corner is whose where inputs are alike.
 
     Raises `ConfigurationError`, `rig.errors.DaqError`, `rig.errors.NotArmed`, `rig.errors.RecordingError`.
     """
@@ -73,6 +125,8 @@ def calibrate(
         device = recorded.parts[0].information["about"]["device"]
     volts = responses.per_volt * np.array([channel.sensitivity_v_per_unit for channel in bare.channels])[:, None]
     paths = fitted_paths(responses.names, responses.frequency_hz, volts, bare.sample_rate_hz)
+    if output_high_pass_hz is not None:
+        paths = paths.exchanged(output_high_pass_hz)
     unclear = [
         one.name
         for one, coherence in zip(paths.inputs, responses.coherence, strict=True)
@@ -81,13 +135,15 @@ def calibrate(
     if unclear or not paths.connected:
         what = f"channel {unclear[0]!r} is too noisy" if unclear else "the output reaches no input"
         raise DaqError(f"{what}; check the cables, or raise --voltage")
-    return Calibrated(paths, bare, level_v, recording, str(device.get("latency_from", "")))
+    passed = high_pass(responses.frequency_hz, paths.output_high_pass_hz)
+    passed_v = level_v * float(np.sqrt(np.mean(np.abs(passed) ** 2)))  # the lines have one amplitude
+    return Calibrated(paths, bare, level_v, passed_v, recording, str(device.get("latency_from", "")))
 
 
 def uncalibrated(bench: Bench) -> Bench:
     """Return the bench without high-passes and skews, with volts for a device that has none yet, on the cables' limits.
 
-    Raises `ConfigurationError` for a bench that this has written: what is in it would be taken for the sensors'.
+    Raises `ConfigurationError` for a calibrated bench: what is in it would be taken for the sensors'.
     """
     options = dict(bench.driver.options)
     if options.get("calibrated"):
@@ -101,7 +157,8 @@ def uncalibrated(bench: Bench) -> Bench:
         options.setdefault("output_full_scale_v", bench.output_range_v)
         options.setdefault("input_full_scale_v", largest_v)
     channels = tuple(
-        channel.model_copy(update={"high_pass_hz": 0.0, "skew_samples": 0.0}) for channel in bench.channels
+        channel.model_copy(update={"high_pass_hz": 0.0, "input_high_pass_hz": 0.0, "skew_samples": 0.0})
+        for channel in bench.channels
     )
     driver = bench.driver.model_copy(update={"options": options})
     return bench.model_copy(update={"driver": driver, "channels": channels})
@@ -127,18 +184,20 @@ def _largest_v(bench: Bench) -> float:
 
 
 def _plan(bench: Bench, rms_v: float, seconds: float) -> MultisinePlan:
-    period = round(bench.sample_rate_hz / RESOLUTION_HZ)
-    resolution_hz = bench.sample_rate_hz / period
+    lowest_hz = bench.limits.frequency_hz[0]
+    highest_hz = min(bench.limits.frequency_hz[1], HIGHEST_SHARE * bench.sample_rate_hz)
+    wanted_hz = min(LARGEST_RESOLUTION_HZ, (highest_hz - lowest_hz) / LEAST_LINES)
+    resolution_hz = bench.sample_rate_hz / math.ceil(bench.sample_rate_hz / wanted_hz)
     return MultisinePlan(
         bench=bench.name,
         description="multisine through cables",
         levels_rms_v=(rms_v,),
-        lowest_hz=bench.limits.frequency_hz[0],
-        highest_hz=min(bench.limits.frequency_hz[1], HIGHEST_SHARE * bench.sample_rate_hz),
+        lowest_hz=lowest_hz,
+        highest_hz=highest_hz,
         resolution_hz=resolution_hz,
         realisations=1,
         periods=max(2, round(seconds * resolution_hz)),
-        transient_periods=2,
+        transient_periods=math.ceil(SETTLING_S * resolution_hz),
         accepted_change=1.0,
     )
 
@@ -149,19 +208,19 @@ def _plan(bench: Bench, rms_v: float, seconds: float) -> MultisinePlan:
 def bench_changes(found: Calibrated, bench: Bench, rms_v: float | None = None) -> Table:
     """Return what a bench changes by a calibration; ``rms_v``: reading of a true RMS multimeter on the output, V.
 
-    Without a reading the volts of output and inputs stay those of the bench. The high-pass of a channel becomes that of sensor
-    and input together, with the phase of both at the specimen's frequency.
+    Without a reading the volts of output and inputs stay those of the bench. A reading is taken behind the output's high-pass;
+    the volts are those before it.
     """
-    scale = 1.0 if rms_v is None else rms_v / found.rms_v
-    reference = next((one for one in found.paths.connected if _is_loopback(bench, one.name)), found.paths.connected[0])
     channels = [
-        _channel(channel.model_dump(exclude_unset=True), one, reference, bench.specimen.linear_frequency_hz)
+        _channel(channel.model_dump(exclude_unset=True), one, found.reference)
         for channel, one in zip(bench.channels, found.paths.inputs, strict=True)
     ]
     options: Table = {"calibrated": datetime.now(UTC).date().isoformat()}
     if found.paths.output_high_pass_hz:
         options["output_high_pass_hz"] = round(found.paths.output_high_pass_hz, 4)
+    options |= {name: bench.driver.options[name] for name in VOLTS if name in bench.driver.options}
     if rms_v is not None:
+        scale = rms_v / found.passed_rms_v
         of_bench = found.bench.driver.options
         output_v, inputs_v = _number(of_bench["output_full_scale_v"]), of_bench["input_full_scale_v"]
         old = np.broadcast_to(np.asarray(inputs_v, float), len(bench.channels))
@@ -177,17 +236,11 @@ def _number(value: object) -> float:
     return float(str(value))
 
 
-def _is_loopback(bench: Bench, name: str) -> bool:
-    return any(channel.loopback and channel.name == name for channel in bench.channels)
-
-
-def _channel(table: Table, one: InputPath, reference: InputPath, frequency_hz: float) -> Table:
+def _channel(table: Table, one: InputPath, reference: InputPath) -> Table:
     """Return the table of a channel with what was found of its input."""
     if not one.connected:
         return table
-    of_sensor = _number(table.get("high_pass_hz", 0.0))
-    lead = math.atan(of_sensor / frequency_hz) + math.atan(one.high_pass_hz / frequency_hz)
-    table["high_pass_hz"] = round(frequency_hz * math.tan(lead), 4)
+    table["input_high_pass_hz"] = round(one.high_pass_hz, 4)
     skew = one.delay_samples - reference.delay_samples
     if abs(skew) > SAME_SKEW:
         table["skew_samples"] = round(skew, 4)
@@ -201,7 +254,7 @@ def _channel(table: Table, one: InputPath, reference: InputPath, frequency_hz: f
 
 def write_bench(path: Path, base: str, changes: Table) -> None:
     """Write a bench that begins from ``base`` and has the changes; raises `RecordingError` where it cannot be written."""
-    text = f"# Written by `rig calibrate`.\n{tomli_w.dumps({'base': base, **changes})}"
+    text = f"# Written by `rig calibrate`, which begins from the base; change that.\n{tomli_w.dumps({'base': base, **changes})}"
     with whole_file(path) as beside:
         beside.write_text(text, encoding="utf-8")
     load_bench(path)

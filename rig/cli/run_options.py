@@ -109,8 +109,12 @@ def _arm_from(arm: bool) -> "Arm":
     """Return True if the switch was given; otherwise a function that asks on the terminal, or None without a terminal."""
     if arm:
         return True
-    on_a_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stderr is not None and sys.stderr.isatty()
-    return ask if on_a_terminal else None
+    return ask if on_a_terminal() else None
+
+
+def on_a_terminal() -> bool:
+    """Return whether a person can be asked: input and messages are those of a terminal."""
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stderr is not None and sys.stderr.isatty()
 
 
 def ask(request: "ArmingRequest") -> bool:

@@ -81,13 +81,14 @@ class Tick:
             segments, bench.sample_rate_hz, amplitude_law, lag_rad, law_record["harmonics"]["wanted"][0]
         )
         force, drive = bench.index_of("force"), bench.index_of("drive")
+        near_hz = bench.specimen.linear_frequency_hz
         smallest = [SMALLEST_BITS * c.resolution_in_unit for c in bench.channels]
         law_record["lock"] = law.lock.build(smallest[force], smallest[drive])
         limits = limits_record(bench)
         if law.harmonics is not None:
             controlled = bench.channels[force if law.harmonics.channel == "force" else drive]
             law_record["harmonics"]["smallest"] = controlled.negligible_amplitude
-            law_record["harmonics"]["high_pass_rad_s"] = 2.0 * math.pi * controlled.high_pass_hz
+            law_record["harmonics"]["high_pass_rad_s"] = 2.0 * math.pi * controlled.corner_hz(near_hz)
             law_record["harmonics"]["step_v"] = limits["slew_v_per_sample"] / law.harmonics.highest
         loop = np.zeros(1, LOOP)
         loop["delay_whole"] = math.floor(loop_delay_samples)
@@ -96,8 +97,8 @@ class Tick:
         loop["dt_s"] = 1.0 / bench.sample_rate_hz
         loop["force_channel"], loop["drive_channel"] = force, drive
         loop["skew_samples"] = bench.channels[force].skew_samples - bench.channels[drive].skew_samples
-        loop["force_high_pass_rad_s"] = 2.0 * math.pi * bench.channels[force].high_pass_hz
-        loop["drive_high_pass_rad_s"] = 2.0 * math.pi * bench.channels[drive].high_pass_hz
+        loop["force_high_pass_rad_s"] = 2.0 * math.pi * bench.channels[force].corner_hz(near_hz)
+        loop["drive_high_pass_rad_s"] = 2.0 * math.pi * bench.channels[drive].corner_hz(near_hz)
         loop["drive"] = table["drive"][:1]
         control = control_state(law_record)
         first = segments[0].excitation if segments else None

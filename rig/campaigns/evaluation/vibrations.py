@@ -215,13 +215,16 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
 
 
 def channel_factors(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:
-    """Return factors that remove each channel's skew and the first-order high-pass of its sensor, complex[n_channels, n].
+    """Return factors that remove each channel's skew and the first-order high-passes of its sensor and input.
 
-    The high-pass is ``1 / (1 - i f_c / f)``. At 0 Hz, which it does not pass, its factor is 1.
+    A high-pass is ``1 / (1 - i f_c / f)``. At 0 Hz, which it does not pass, its factor is 1. The result is
+    complex[n_channels, n].
     """
-    corner_hz = np.array([channel.high_pass_hz for channel in bench.channels])
+    corners_hz = np.array([(channel.high_pass_hz, channel.input_high_pass_hz) for channel in bench.channels])
     over = np.divide(1.0, frequency_hz, out=np.zeros(np.shape(frequency_hz)), where=np.asarray(frequency_hz) != 0.0)
-    return np.asarray(skew_turn(bench, frequency_hz) * (1.0 - 1j * np.outer(corner_hz, over)))
+    return np.asarray(
+        skew_turn(bench, frequency_hz) * np.prod(1.0 - 1j * corners_hz[:, :, None] * np.ravel(over), axis=1)
+    )
 
 
 def skew_turn(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:

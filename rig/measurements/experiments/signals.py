@@ -86,22 +86,23 @@ class Signals:
         return np.array([*(channel.skew_samples for channel in self.bench.channels), 0.0])
 
     def without_high_pass(self, signals: np.ndarray) -> np.ndarray:
-        """Remove the high-pass of the sensors above some hertz from a record that is not periodic; below, it stays.
+        """Remove the high-passes of sensors and inputs above some hertz from a record that is not periodic; below, it stays.
 
         The exact inverse, ``1 - i f_c / f``, would integrate offsets and drift. Its second part therefore fades below
         `_RESTORED` corners: at 25 Hz and a corner of 0.3 Hz an error of 2e-4 rad is left of 0.012 rad. A second at either end
         of a record that does not begin or end at rest is not corrected in full.
         """
-        corner_hz = np.array([channel.high_pass_hz for channel in self.bench.channels])
-        if not corner_hz.any():
+        corners_hz = np.array([(one.high_pass_hz, one.input_high_pass_hz) for one in self.bench.channels])
+        if not corners_hz.any():
             return signals
         rate_hz, samples = self.bench.sample_rate_hz, signals.shape[1]
-        padded = scipy.fft.next_fast_len(samples + int(rate_hz / corner_hz[corner_hz > 0.0].min()))
+        padded = scipy.fft.next_fast_len(samples + int(rate_hz / corners_hz[corners_hz > 0.0].min()))
         frequency_hz = np.fft.rfftfreq(padded, 1.0 / rate_hz)
         found = signals.copy()
-        for row in np.flatnonzero(corner_hz):
-            factor = -1j * corner_hz[row] * frequency_hz / (frequency_hz**2 + (_RESTORED * corner_hz[row]) ** 2)
-            found[row] += scipy.fft.irfft(scipy.fft.rfft(signals[row], padded) * factor, padded)[:samples]
+        for row, column in zip(*np.nonzero(corners_hz), strict=True):
+            corner_hz = corners_hz[row, column]
+            factor = -1j * corner_hz * frequency_hz / (frequency_hz**2 + (_RESTORED * corner_hz) ** 2)
+            found[row] += scipy.fft.irfft(scipy.fft.rfft(found[row], padded) * factor, padded)[:samples]
         return np.asarray(found)
 
     def in_step(self, signals: np.ndarray) -> tuple[np.ndarray, int]:

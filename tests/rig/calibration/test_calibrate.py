@@ -1,5 +1,6 @@
 """`rig calibrate` over cables with known high-passes, gains and delays: the bench then takes the true phases out."""
 
+import json
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy import signal
 from rig.bench import Bench, load_bench
 from rig.daq import DAQ, Capabilities
 from rig.loop import session
+from rig.recording.reader import Recording
 
 RATE_HZ = 12000.0
 GAINS = 1.0, -1.02, 0.98, 1.0
@@ -16,6 +18,9 @@ DELAYS = 0, 0, 1, 0
 CORNERS_HZ = 2.0, 5.0, 10.0, 1.0
 OUTPUT_HZ = 5.0
 LATENCY = 64
+FULL_SCALE_V = 10.0
+TRUE_VOLTS = 1.3
+"""Volts on the output for each that the bench believes."""
 
 BENCH = """
 name = "cables"
@@ -117,7 +122,7 @@ def test_the_bench_that_is_written_takes_the_true_phases_out(cables, command):
     own = 0.3, 0.0, 0.0, 0.0  # of the sensors
     for index, channel in enumerate(bench.channels):
         for frequency_hz in (10.0, 25.0, 100.0):
-            ours = math.atan(channel.high_pass_hz / frequency_hz)
+            ours = math.atan(channel.high_pass_hz / frequency_hz) + math.atan(channel.input_high_pass_hz / frequency_hz)
             true = math.atan(CORNERS_HZ[index] / frequency_hz) + math.atan(own[index] / frequency_hz)
             assert math.degrees(abs(ours - true)) < 0.2, channel.name
     assert [channel.skew_samples for channel in bench.channels] == pytest.approx([0.0, 0.0, 1.0, 0.0], abs=0.005)
@@ -132,6 +137,7 @@ def test_an_input_without_a_cable_keeps_what_it_had(cables, command, monkeypatch
     said = command("calibrate", "bench.toml", "-o", "calibrated.toml").succeeded().out
     assert "force: no cable; crosstalk -54 dB" in said
     assert load_bench("calibrated.toml").channels[0].high_pass_hz == 0.3
+    assert load_bench("calibrated.toml").channels[0].input_high_pass_hz == 0.0
 
 
 def test_no_cable_at_all_is_said(cables, command, monkeypatch):
@@ -141,11 +147,37 @@ def test_no_cable_at_all_is_said(cables, command, monkeypatch):
     assert "check the cables" in said.err
 
 
-def test_a_calibrated_bench_is_not_calibrated_again(cables, command):
-    command("calibrate", "bench.toml", "-o", "calibrated.toml")
-    said = command("calibrate", "calibrated.toml", "-o", "again.toml")
+def test_a_calibrated_bench_is_calibrated_anew_from_its_base(cables, command, tmp_path):
+    command("calibrate", "bench.toml", "-o", "calibrated.toml").succeeded()
+    command("calibrate", "calibrated.toml", "-o", "again.toml").succeeded()
+    assert (tmp_path / "again.toml").read_text() == (tmp_path / "calibrated.toml").read_text()
+
+
+def test_what_begins_from_a_calibrated_bench_is_not_calibrated(cables, command, tmp_path):
+    command("calibrate", "bench.toml", "-o", "calibrated.toml").succeeded()
+    (tmp_path / "mine.toml").write_text('base = "calibrated.toml"\n')
+    said = command("calibrate", "mine.toml", "-o", "again.toml")
     assert said.status == 1
     assert "begin from the bench that it was made of" in said.err
+
+
+def test_a_reading_behind_the_high_pass_gives_the_volts_before_it(cables, command, tmp_path):
+    options = f"{{ output_full_scale_v = {FULL_SCALE_V}, input_full_scale_v = {FULL_SCALE_V} }}"
+    (tmp_path / "bench.toml").write_text(
+        BENCH.replace('name = "cables"\n\n[l', f'name = "cables"\noptions = {options}\n\n[l')
+    )
+    found = json.loads(command("calibrate", "bench.toml", "-o", "first.toml", "--json").succeeded().out)
+    with Recording(tmp_path / "first.h5") as recording:
+        sent = recording.parts[-1].rows("output_v").astype(float)
+    sent = sent[-3 * int(RATE_HZ) : -int(RATE_HZ)]  # whole periods of the steady signal
+    passed = signal.lfilter(*signal.butter(1, OUTPUT_HZ, "high", fs=RATE_HZ), np.tile(sent, 2))[sent.size :]
+    reading = TRUE_VOLTS * np.sqrt(np.mean(passed**2))
+    assert reading < 0.999 * TRUE_VOLTS * found["rms_v"]
+    command("calibrate", "bench.toml", "-o", "again.toml", "--rms-v", str(reading)).succeeded()
+    options = load_bench("again.toml").driver.options
+    assert options["output_full_scale_v"] == pytest.approx(TRUE_VOLTS * FULL_SCALE_V, rel=3e-4)
+    for full_scale_v, gain in zip(options["input_full_scale_v"], GAINS, strict=True):
+        assert full_scale_v == pytest.approx(TRUE_VOLTS * FULL_SCALE_V / abs(gain), rel=3e-4)
 
 
 def test_a_voltage_beyond_the_limits_is_refused_by_its_option(cables, command):

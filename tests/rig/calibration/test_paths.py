@@ -57,3 +57,20 @@ def test_an_input_without_a_cable_has_its_crosstalk():
 def test_nothing_connected_is_no_division_by_zero():
     found = fitted_paths(("a", "b"), LINES_HZ, np.zeros((2, LINES_HZ.size), complex), RATE_HZ)
     assert not found.connected
+
+
+@pytest.mark.parametrize(("output_hz", "inputs_hz"), [(2.0, 5.0), (5.0, 2.0)])
+def test_the_output_s_corner_says_whose_is_whose_where_inputs_are_alike(output_hz, inputs_hz):
+    measured = responses(output_hz, [1.0, 0.9], [0.0, 0.0], [inputs_hz, inputs_hz])
+    found = fitted_paths(("a", "b"), LINES_HZ, measured, RATE_HZ)
+    assert found.are_alike
+    told = found.exchanged(output_hz + 0.7)
+    assert told.output_high_pass_hz == pytest.approx(output_hz, abs=0.01)
+    assert [one.high_pass_hz for one in told.inputs] == pytest.approx([inputs_hz, inputs_hz], abs=0.01)
+    assert told.exchanged(output_hz) == told
+
+
+def test_inputs_that_differ_tell_it_themselves():
+    found = fitted_paths(("a", "b"), LINES_HZ, responses(2.0, [1.0, 1.0], [0.0, 0.0], [5.0, 7.0]), RATE_HZ)
+    assert not found.are_alike
+    assert found.exchanged(5.0) == found
