@@ -7,10 +7,12 @@ periods later. Audio inputs and outputs pass no direct voltage: high-passes are 
 rate, behind the converters.
 """
 
+import ctypes
 import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,6 +36,8 @@ NAME = "structure"
 """Name under which the card appears among the sound devices."""
 RATE_HZ, PERIOD = 48000, 128
 """Sample rate, Hz, and frames of a period of a server that is started here."""
+SET_PARENT_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of <sys/prctl.h>."""
 START_S = 5.0
 """Longest wait for a server to answer, s."""
 DECIMATION = 4
@@ -221,7 +225,13 @@ def _server(jack: Any) -> Iterator[None]:
     if program is None:
         raise DaqRefused("the program jackd is not installed; on Debian: apt install jackd2")
     command = [program, *_scheduling(), "-S", "-d", "dummy", "-r", str(RATE_HZ), "-p", str(PERIOD)]
-    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    server = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+    )
     try:
         until = time.monotonic() + START_S
         while not _answers(jack):
@@ -236,6 +246,11 @@ def _server(jack: Any) -> Iterator[None]:
         except subprocess.TimeoutExpired:
             server.kill()
             server.wait()
+
+
+def _end_with_parent() -> None:
+    """Let the server end when this process is killed."""
+    ctypes.CDLL(None).prctl(SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
 
 
 def _scheduling() -> list[str]:

@@ -196,7 +196,8 @@ def _rate(
             bounds[f"the wire carries {share:.0%} of its capacity at {rate_hz:g} Hz"] = (
                 allowed.largest_wire_share * rate_hz / share
             )
-        bounds["the device samples no faster"] = allowed.rate_range_hz[1]
+        lowest_hz, highest_hz = allowed.rate_range_hz
+        bounds["the device samples no faster" if lowest_hz < highest_hz else "it is the rate of the bench"] = highest_hz
     if not bounds:
         return rate_hz, "nothing that bounds it was measured"
     why = min(bounds, key=bounds.__getitem__)

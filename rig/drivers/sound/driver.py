@@ -285,7 +285,8 @@ class SoundDAQ(DAQ):
         if self._due < 0:
             stream.begin()
             self._due = self._queue * self.block * factor
-        counts = counts_of(self._interpolate(voltages), self._options.output_full_scale_v or 1.0)
+        volts = np.clip(self._interpolate(voltages), -self.output_range_v, self.output_range_v)  # also between samples
+        counts = counts_of(volts, self._options.output_full_scale_v or 1.0)
         period, ramp = self.continuation[0].item()
         stream.put(self._due, counts, period_steps(period * factor), ramp_length(ramp * factor))
         self._due += counts.size

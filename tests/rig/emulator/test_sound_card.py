@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from rig.bench import load_bench
 from rig.conformance.run import OUTCOMES
 from rig.conformance.without_host import KILLING_TEST
 from rig.drivers.virtual import VirtualDAQ
-from rig.emulator.emulated import emulated
+from rig.emulator.emulated import Emulator, emulated
 from rig.emulator.sound import RATE_HZ, card_bench
 from tests.rig.emulator.calibrating import CORNERS_HZ, require_harmonic_balance
 from tests.rig.rigs import bench_with
@@ -95,6 +96,14 @@ def _server():
     raise AssertionError("no server")
 
 
+def _runs(process):
+    """Whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def test_the_latency_is_that_of_the_graph_and_of_the_cards_converters(card):
     rig = VirtualDAQ(card_bench(bench_with(), float(RATE_HZ))).rig
     said = _said(card, "latency")
@@ -119,6 +128,16 @@ def test_a_calibration_by_the_clock_makes_phases_latency_and_a_locked_test_right
     if any(not point["accepted"] for point in points):
         pytest.skip(f"too busy: {points}")
     require_harmonic_balance(points)
+
+
+def test_the_server_ends_with_a_card_that_is_killed(server):
+    with Emulator(bench_with(), "sound", lockstep=False) as card:
+        jackd = _server()
+        card.process.kill()
+        until = time.monotonic() + 30.0
+        while _runs(jackd):
+            assert time.monotonic() < until
+            time.sleep(0.05)
 
 
 def test_a_server_that_ends_is_a_device_that_is_gone(card):

@@ -175,6 +175,17 @@ def test_blocks_of_any_size_are_filtered_alike():
     np.testing.assert_allclose(np.concatenate([down(part) for part in frames.reshape(-1, 32, 2)]), at_once[1])
 
 
+def test_nothing_beyond_the_largest_output_is_put_out_between_two_samples(card):
+    made = card()
+    with Driven(bench(12000.0, 32), periodic=False) as driven:
+        limit_v = driven.daq.output_range_v
+        driven.volts = lambda instants: np.where(instants // 5 % 2, limit_v, -limit_v)
+        driven.exchange(50)
+        sent, *_ = driven.together()
+        assert np.abs(Interpolator(4)(sent)).max() > 1.05 * limit_v
+    assert np.abs(made.put_out).max() * SCALE_V == pytest.approx(limit_v, rel=1e-6)
+
+
 # Late outputs
 
 
