@@ -106,13 +106,7 @@ class Card:
     def _period(self, frames: int) -> None:
         try:
             self._pass_lost_time(frames)
-            volts = self._plant.output_range_v * np.array(self._drive.get_array(), float)
-            self._of_output(volts[:, None])
-            counts, flags = self._plant.step(volts)
-            readings = counts * self._per_count
-            if self._cables:
-                readings[:], flags = readings[:, -1:], 0
-            self._of_inputs(readings)
+            readings, flags = self._read(self._plant.output_range_v * np.array(self._drive.get_array(), float))
             for port, reading in zip(self._sensors, readings.T, strict=True):
                 port.get_array()[:] = reading
             self.counts["periods"] += 1
@@ -122,11 +116,21 @@ class Card:
             for port in self._sensors:
                 port.get_array()[:] = 0.0
 
+    def _read(self, volts: Float) -> tuple[Float, int]:
+        """Put out voltages [n]; return the readings [n, n_channels] in full scales and the rig's flags."""
+        self._of_output(volts[:, None])
+        counts, flags = self._plant.step(volts)
+        readings = counts * self._per_count
+        if self._cables:
+            readings[:], flags = readings[:, -1:], 0
+        self._of_inputs(readings)
+        return readings, flags
+
     def _pass_lost_time(self, frames: int) -> None:
         interrupted, self._seen = self.counts["interruptions"] > self._seen, self.counts["interruptions"]
         lost = max(0, lost_frames(self._clock, time.monotonic(), self._frame, frames, interrupted))
         if lost:
-            self._plant.step(np.zeros(lost))
+            self._read(np.zeros(lost))
             self.counts["lost_frames"] += lost
         self._frame += lost + frames
 
