@@ -63,7 +63,7 @@ class NiDaqmxDAQ(DAQ):
         self._tasks: Tasks | None = None
         self._buffer: BufferThread | None = None
         self._watchdog: DeviceWatchdog | None = None
-        self._was_expired = False
+        self._about_watchdog, self._was_expired = "not used", False
         self._version = ""
         self._counted = dict.fromkeys(FLAGS, 0)
 
@@ -118,7 +118,7 @@ class NiDaqmxDAQ(DAQ):
             "input_delay_s": f"{facts.input_delays_s[0]:.3g}",
             "output_delay_s": f"{facts.output_delay_s:.3g}",
             "buffer_blocks": str(self._ahead(self.block or self._bench.block)),
-            "device_watchdog": self._watchdog.about if self._watchdog else "not used",
+            "device_watchdog": self._about_watchdog,
         }
 
     @property
@@ -183,7 +183,7 @@ class NiDaqmxDAQ(DAQ):
             if self._options.device_watchdog:
                 watchdog = DeviceWatchdog(session, self._options.output, self._watchdog_s)
                 watchdog.close()
-                self._was_expired = watchdog.was_expired
+                self._about_watchdog, self._was_expired = watchdog.about, watchdog.was_expired
             put_zero(session, self._options.output, self.output_range_v)
             tasks = self._make_tasks(self._bench.block)
             self._facts = facts = tasks.facts
