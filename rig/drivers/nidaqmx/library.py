@@ -187,7 +187,7 @@ def as_ni_error(error: Exception, where: str) -> DaqError:
     if isinstance(error, errors.DaqNotFoundError | errors.DaqNotSupportedError):
         return DaqRefused(NO_DRIVER)
     if isinstance(error, errors.RpcError):
-        if "UNAVAILABLE" in str(error):
+        if any(code in str(error) for code in ("UNAVAILABLE", "CANCELLED")):  # is not there; went away
             return DaqDisconnected(f"the device server does not answer ({error})", where=where)
         return DaqError(f"the device server has failed ({error})", where=where)
     if not isinstance(error, errors.DaqError):
