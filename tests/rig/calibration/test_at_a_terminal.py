@@ -1,0 +1,65 @@
+"""`rig calibrate` with a person at the terminal, who is asked for the reading of a multimeter."""
+
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from rig.bench import load_bench
+from tests.rig.calibration.test_calibrate import BENCH, FULL_SCALE_V
+
+fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
+
+
+CABLES = "from tests.rig.calibration.test_calibrate import Cables, session; session.make_daq = Cables; import rig.cli; rig.cli.main()"
+"""A process of the command with cables as its device."""
+
+
+def at_a_terminal(typed, folder):
+    """What the command says and its status with a person at the terminal, who types this when asked for the reading."""
+    ours, theirs = pty.openpty()
+    line = [sys.executable, "-c", CABLES, "calibrate", "bench.toml", "-o", "calibrated.toml", "--seconds", "4"]
+    path = {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[3]), *sys.path])}
+    process = subprocess.Popen(
+        line,
+        cwd=folder,
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env=os.environ | path,
+        start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # so that Ctrl-C is a signal
+    )
+    os.close(theirs)
+    said = b""
+    with suppress(OSError):  # the terminal is closed by its last process
+        while part := os.read(ours, 4096):
+            said += part
+            if typed and said.rstrip().endswith(b"(Enter for none):"):
+                os.write(ours, typed.pop(0))
+                said += b" "
+    os.close(ours)
+    return said.decode(), process.wait()
+
+
+def test_a_person_at_the_terminal_is_asked_for_the_reading(tmp_path):
+    options = f"options = {{ output_full_scale_v = {FULL_SCALE_V}, input_full_scale_v = {FULL_SCALE_V} }}"
+    (tmp_path / "bench.toml").write_text(BENCH.replace('name = "cables"\n\n[l', f'name = "cables"\n{options}\n\n[l'))
+    said, status = at_a_terminal([b"a lot\n", b"0.5\n"], tmp_path)
+    assert status == 0, said
+    assert said.index("read a true RMS multimeter") < said.index("reading of the multimeter")
+    assert "allowed is a number above 0" in said
+    assert load_bench(tmp_path / "calibrated.toml").driver.options["output_full_scale_v"] == pytest.approx(
+        0.5 / 0.408 * FULL_SCALE_V, rel=0.01
+    )
+
+
+def test_ctrl_c_at_the_question_writes_nothing_and_says_one_line(tmp_path):
+    (tmp_path / "bench.toml").write_text(BENCH)
+    said, status = at_a_terminal([b"\x03"], tmp_path)
+    assert status == 130
+    assert not (tmp_path / "calibrated.toml").exists()
+    assert said.rpartition("(Enter for none):")[2].replace("^C", "").strip() == "rig: interrupted"
