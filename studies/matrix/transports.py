@@ -1,5 +1,8 @@
-"""Transports by which a test runs without a rig: virtual driver, emulators of each wire, firmware for the host or in QEMU."""
+"""Transports by which a test runs without a rig: virtual driver, emulators of each wire and of a sound card, firmware for the
+host or in QEMU."""
 
+import shutil
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -7,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench import Bench
+from rig.drivers.sound.devices import library
 from rig.emulator.emulated import emulated
+from rig.errors import DaqRefused
 
 EMULATED_BLOCK = 10
 """Samples a block, 2 ms at 5 kHz: what a host with ordinary scheduling keeps up with."""
@@ -15,6 +20,8 @@ ARM = 40
 """Machine in the header of an ELF file."""
 CLASSICAL_PART = 0.5
 """Part of the bench's sample rate: classical CAN cannot carry 5 kHz sample by sample."""
+SOUND_RATES_HZ = (48000.0, 12000.0, 6000.0)
+"""Sample rates of the benches at an emulated sound card: its own, and fractions of it."""
 FILTER_PART = 0.4
 """Corner of the virtual converter's filter at another sample rate, as a part of that rate; chosen."""
 
@@ -25,18 +32,20 @@ class Transport:
 
     name: str
     wire: str | None = None
-    """``serial`` or ``can``; None for the virtual driver in this process."""
+    """``serial``, ``can`` or ``sound``; None for the virtual driver in this process."""
     lockstep: bool = True
     """Whether the device waits for the host."""
     rate_part: float = 1.0
     """Sample rate, as a part of the bench's."""
+    rate_hz: float | None = None
+    """Sample rate at a sound card, which runs at its own."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Further settings of the emulator (`rig.emulator.settings.EmulatorSettings`)."""
 
     def scaled(self, bench: Bench) -> Bench:
         """Return the bench at the rate and with the block of this transport."""
         changes: dict[str, Any] = {}
-        if self.wire is not None:
+        if self.wire is not None and self.rate_hz is None:
             changes["block"] = max(bench.block, EMULATED_BLOCK)
         if self.rate_part != 1.0:
             rate_hz = self.rate_part * bench.sample_rate_hz
@@ -53,12 +62,12 @@ class Transport:
             yield bench
             return
         with emulated(bench, self.wire, lockstep=self.lockstep, log_output=output_log, **self.settings) as reached:
-            yield reached
+            yield reached if self.rate_hz is None else at_rate(reached, self.rate_hz)
 
 
 def transports(firmware: Sequence[Path] = ()) -> list[Transport]:
     """Return the transports that every machine has, and those to ``firmware``: files for the host or for ARM (QEMU)."""
-    out = [Transport("virtual"), *_wires("emulator")]
+    out = [Transport("virtual"), *_wires("emulator"), *_sound_cards()]
     for path in firmware:
         settings = {"firmware": path}
         if is_arm(path):  # time in QEMU is not real, and its serial line is slow
@@ -74,6 +83,30 @@ def _wires(device: str, **settings: Any) -> Iterator[Transport]:
         yield Transport(f"serial, {device} {how}", "serial", lockstep, settings=settings)
         yield Transport(f"CAN FD, {device} {how}", "can", lockstep, settings=settings)
         yield Transport(f"classical CAN, {device} {how}", "can", lockstep, CLASSICAL_PART, {"fd": False, **settings})
+
+
+def _sound_cards() -> Iterator[Transport]:
+    """Yield an emulated sound card at each rate; nothing where PortAudio or JACK is missing, with a word."""
+    try:
+        library()
+        import jack  # noqa: F401
+    except (DaqRefused, ImportError, OSError) as error:
+        missing = str(error)
+    else:
+        missing = "" if shutil.which("jackd") else "the program jackd is not installed"
+    if missing:
+        print(f"left out: the emulated sound card: {missing}", file=sys.stderr)
+        return
+    for rate_hz in SOUND_RATES_HZ:
+        name = f"sound at {1e-3 * rate_hz:g} kHz, emulated card by the clock"
+        yield Transport(name, "sound", lockstep=False, rate_hz=rate_hz)
+
+
+def at_rate(bench: Bench, rate_hz: float) -> Bench:
+    """Return the bench of an emulated sound card at another rate, with a block of a period of the audio system."""
+    options = bench.driver.options
+    block = round(int(str(options["period_frames"])) * rate_hz / float(str(options["device_rate_hz"])))
+    return bench.model_copy(update={"sample_rate_hz": rate_hz, "block": block})
 
 
 def is_arm(path: Path) -> bool:

@@ -176,13 +176,13 @@ class SoundDAQ(DAQ):
     def _open(self) -> None:
         options, bench = self._options, self._bench
         device = found(options.device, options.host_api)
-        for field, needed, has in (
-            ("driver.options.output", options.output, device.outputs),
-            ("driver.options.inputs", max(self._inputs), device.inputs),
-        ):
+        for kind, needed, has in (("output", options.output, device.outputs), ("input", max(self._inputs), device.inputs)):
             if needed > has:
                 raise DaqMismatch(
-                    f"{device.text} has {has} such channels", field=field, value=needed, allowed=f"1 to {has}"
+                    f"{device.text} has {has} {kind}{'' if has == 1 else 's'}",
+                    field="driver.options.output" if kind == "output" else "driver.options.inputs",
+                    value=needed,
+                    allowed=f"1 to {has}" if has > 1 else "1" if has else "another device",
                 )
         rates = supported_rates(device, max(self._inputs), options.output)
         self._rate_hz = chosen_rate(bench.sample_rate_hz, rates, options.device_rate_hz, device.text)

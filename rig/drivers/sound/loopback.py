@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.drivers.sound.stream import DuplexStream
-from rig.errors import DaqError
+from rig.errors import DaqError, DaqOverrun
 from vibrolock.arrays import Float
 
 BAND = (0.02, 0.1)
@@ -77,14 +77,15 @@ def delay_of(sent: Float, read: Float) -> Loopback:
 def measured_delay(stream: DuplexStream, column: int, amplitude: int, channel: str) -> float:
     """Put out one period of the signal with a peak of ``amplitude`` counts, and return its delay to a column, frames.
 
-    It is repeated where the audio system has lost frames. Raises `DaqError` where the signal does not come back.
+    It is repeated where the audio system has lost frames. Raises `DaqOverrun` where that happens every time, `DaqError` where the
+    signal does not come back.
     """
     for _ in range(ATTEMPTS):
         heard = _heard(stream, column, amplitude)
         if heard is not None and heard.coherence >= LEAST_COHERENCE:
             return heard.delay
     if heard is None:
-        raise DaqError(
+        raise DaqOverrun(
             f"the delay of the stream cannot be measured: the audio system has lost frames in each of {ATTEMPTS} attempts "
             "(driver.options.period_frames)"
         )

@@ -17,8 +17,9 @@ SHORTEST_SLEEP_S = 1e-4
 """Shortest sleep while frames are awaited, s; chosen: far below a period."""
 WRONG_RATE = 0.02
 """Relative difference from the nominal rate from which on the device runs at another; chosen: clocks differ by 1e-4."""
-RATE_OVER_S = 1.0
-"""Time over which the rate of the device is measured, s."""
+RATE_OVER_S, RATE_TIMES = 1.0, 3
+"""Time over which the rate of the device is measured, s, and how often it must be wrong in a row; a busy computer's audio system may
+be slow for a second."""
 
 
 class Setting(NamedTuple):
@@ -95,7 +96,7 @@ class DuplexStream:
         except BaseException:
             self.close()
             raise
-        self._began = time.monotonic(), int(self._record["done"]), 0
+        self._began, self._times_wrong = (time.monotonic(), int(self._record["done"]), 0), 0
 
     @property
     def interruptions(self) -> int:
@@ -182,9 +183,9 @@ class DuplexStream:
         self._began = now, done, self.interruptions
         nominal_hz = self._setting.rate_hz
         periods_s = 4.0 * self._setting.period / nominal_hz
-        if interruptions == self.interruptions and abs(rate_hz / nominal_hz - 1.0) > WRONG_RATE + periods_s / (
-            now - began
-        ):
+        off = abs(rate_hz / nominal_hz - 1.0) - periods_s / (now - began)
+        self._times_wrong = self._times_wrong + 1 if interruptions == self.interruptions and off > WRONG_RATE else 0
+        if self._times_wrong == RATE_TIMES:
             raise DaqError(
                 f"{self._setting.device.text}: the device runs at about {rate_hz:.4g} frames/s, not at {nominal_hz:g}; "
                 "another program has changed its rate"

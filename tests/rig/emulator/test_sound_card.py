@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -22,6 +21,7 @@ from rig.emulator.emulated import Emulator, emulated
 from rig.emulator.sound import RATE_HZ, card_bench
 from tests.rig.emulator.calibrating import CORNERS_HZ, require_harmonic_balance
 from tests.rig.rigs import bench_with
+from tests.sound_server import own_sound_server
 
 PERIODS = 2
 """Of the graph: the output of one period is in the inputs of the second one after it."""
@@ -29,28 +29,9 @@ BUSY = ("lost frames in each", "samples were lost", "too noisy", "was not played
 """Said where this machine is too busy for an audio server."""
 
 
-def _missing():
-    if not shutil.which("jackd"):
-        return "no jackd (Debian: jackd2)"
-    try:
-        import jack  # noqa: F401
-        import sounddevice  # noqa: F401
-    except (ImportError, OSError) as error:
-        return f"the audio packages are not there: {error}"
-    return ""
-
-
 @pytest.fixture
 def server(monkeypatch):
-    """A server of this test's own for the card; without JACK the test skips, or fails where it must be there."""
-    missing = _missing()
-    if missing and os.environ.get("VIBROLOCK_SOUND") == "required":
-        pytest.fail(missing)
-    if missing:
-        pytest.skip(missing)
-    monkeypatch.setenv("JACK_DEFAULT_SERVER", f"vibrolock-{os.getpid()}")
-    monkeypatch.setenv("JACK_NO_START_SERVER", "1")
-    monkeypatch.setenv("JACK_NO_AUDIO_RESERVATION", "1")
+    own_sound_server(monkeypatch)
 
 
 def _card(**settings):

@@ -367,7 +367,7 @@ def test_another_rate_than_was_asked_for_is_noticed(card):
         driven.exchange(10)
         made.slow = 48.0 / 44.1
         with pytest.raises(DaqError, match="another program has changed its rate"):
-            driven.exchange(800)
+            driven.exchange(1600)
 
 
 def test_a_card_in_use_is_busy(card):
