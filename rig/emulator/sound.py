@@ -102,6 +102,7 @@ class Card:
         self._per_count = plant.v_per_count / plant.range_v
         client.set_process_callback(self._period)
         client.set_xrun_callback(self._interrupted)
+        client.set_shutdown_callback(self._server_ended)
 
     def _period(self, frames: int) -> None:
         try:
@@ -133,6 +134,9 @@ class Card:
             self._read(np.zeros(lost))
             self.counts["lost_frames"] += lost
         self._frame += lost + frames
+
+    def _server_ended(self, _status: object, reason: str) -> None:
+        self.failure = DaqError(f"the JACK server has ended ({reason})")
 
     def _interrupted(self, _delayed_us: float) -> None:
         self.counts["interruptions"] += 1

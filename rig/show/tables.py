@@ -19,7 +19,7 @@ from vibrolock.printable import printable, printable_strings
 
 _OWN_UNITS = (
     *("frames", "blocks", "lines", "bytes", "errors"),
-    *("answers", "retries", "versions", "malformed", "resynchronised"),
+    *("answers", "retries", "interruptions", "versions", "malformed", "resynchronised"),
 )
 """Ends of the names of counters that do not count samples."""
 

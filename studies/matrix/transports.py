@@ -1,5 +1,4 @@
-"""Transports by which a test runs without a rig: virtual driver, emulators of each wire and of a sound card, firmware for the
-host or in QEMU."""
+"""Transports by which a test runs without a rig: virtual driver, emulators of wires and of a sound card, firmware."""
 
 import shutil
 import sys

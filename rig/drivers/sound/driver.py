@@ -176,7 +176,10 @@ class SoundDAQ(DAQ):
     def _open(self) -> None:
         options, bench = self._options, self._bench
         device = found(options.device, options.host_api)
-        for kind, needed, has in (("output", options.output, device.outputs), ("input", max(self._inputs), device.inputs)):
+        for kind, needed, has in (
+            ("output", options.output, device.outputs),
+            ("input", max(self._inputs), device.inputs),
+        ):
             if needed > has:
                 raise DaqMismatch(
                     f"{device.text} has {has} {kind}{'' if has == 1 else 's'}",

@@ -77,8 +77,8 @@ def delay_of(sent: Float, read: Float) -> Loopback:
 def measured_delay(stream: DuplexStream, column: int, amplitude: int, channel: str) -> float:
     """Put out one period of the signal with a peak of ``amplitude`` counts, and return its delay to a column, frames.
 
-    It is repeated where the audio system has lost frames. Raises `DaqOverrun` where that happens every time, `DaqError` where the
-    signal does not come back.
+    It is repeated where the audio system has lost frames. Raises `DaqOverrun` where it loses some every time, `DaqError` where
+    the signal does not come back.
     """
     for _ in range(ATTEMPTS):
         heard = _heard(stream, column, amplitude)

@@ -18,8 +18,8 @@ SHORTEST_SLEEP_S = 1e-4
 WRONG_RATE = 0.02
 """Relative difference from the nominal rate from which on the device runs at another; chosen: clocks differ by 1e-4."""
 RATE_OVER_S, RATE_TIMES = 1.0, 3
-"""Time over which the rate of the device is measured, s, and how often it must be wrong in a row; a busy computer's audio system may
-be slow for a second."""
+"""Time over which the rate of the device is measured, s, and how often in a row it must be wrong: on a busy computer an audio
+system may be slow for a second."""
 
 
 class Setting(NamedTuple):
@@ -150,20 +150,24 @@ class DuplexStream:
         Raises `DaqDisconnected` or `DaqTimeout` if no frames have come for the time allowed.
         """
         seen, since = int(self._record["done"]), time.monotonic()
+        looked = since
         period_s = self._setting.period / self._setting.rate_hz
         while not true():
             time.sleep(max(SHORTEST_SLEEP_S, 0.1 * period_s))
             done, now = int(self._record["done"]), time.monotonic()
-            if done != seen:
+            if (
+                done != seen or now - looked > 0.5 * self._setting.timeout_s
+            ):  # this process itself may have been stopped
                 seen, since = done, now
             elif now - since > self._setting.timeout_s:
                 self._is_silent = True
                 device = self._setting.device.text
                 if not self._is_active:
-                    raise DaqDisconnected(f"{device}: the stream has ended; the device is gone, plug it in again")
+                    raise DaqDisconnected(f"{device}: the stream has ended: the device or its audio server is gone")
                 raise DaqTimeout(
                     f"{device}: no frames have come for {self._setting.timeout_s:g} s; the device or its audio server is silent"
                 )
+            looked = now
 
     @property
     def _is_active(self) -> bool:

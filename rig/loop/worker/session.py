@@ -18,7 +18,7 @@ from rig.loop.loop import LoopStatistics
 from rig.loop.worker.loop import CHUNK_DONE
 from rig.loop.worker.memory import RELEASE_START, START_JUDGED, STOP, TAKEN, TIMES, Layout, SharedMemory, packed
 from rig.loop.worker.queue_choice import QueueChoice
-from rig.loop.worker.spawn import Worker, rebuilt
+from rig.loop.worker.spawn import WITHOUT_HOST, Worker, rebuilt
 from rig.text.json_values import JsonObject
 from rig.tick.tick import TickSettings
 
@@ -115,7 +115,7 @@ class WorkerLoop:
         try:
             if not facts.poll(self._silence_s):
                 left = self._worker.end(HUNG_S + self._ramp_down_s)
-                how = left or "the loop's process was ended; the device's own watchdog brings its output to 0 V"
+                how = left or f"the loop's process was ended; {WITHOUT_HOST}"
                 text = f"the loop's process has been silent for {self._silence_s:g} s: its driver hangs; {how}"
                 return partial(self._end, DaqError(text))
             said = facts.recv_bytes()

@@ -12,6 +12,8 @@ import rig.errors
 from rig.errors import DaqError, RigError
 from rig.loop.worker.memory import anonymous_file
 
+WITHOUT_HOST = "the device's own watchdog brings its output to 0 V; where it has none, press the emergency stop"
+"""What follows where nothing drives a device any more."""
 KILLED = "the loop's process was killed; only the device's watchdog has acted"
 
 
@@ -76,7 +78,7 @@ class Worker:
         except subprocess.TimeoutExpired:
             return DaqError("the loop's process is silent, and was not waited for any longer")
         how = signal.Signals(-status).name if status < 0 else f"status {status}"
-        return DaqError(f"the loop's process has ended ({how}); the device's own watchdog brings its output to 0 V")
+        return DaqError(f"the loop's process has ended ({how}); {WITHOUT_HOST}")
 
     def end(self, timeout_s: float) -> str:
         """Ask the process to end, then kill it. Return in one sentence what went wrong; empty if it ended by itself."""
