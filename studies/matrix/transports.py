@@ -36,10 +36,10 @@ class Transport:
     """Whether the device waits for the host."""
     rate_part: float = 1.0
     """Sample rate, as a part of the bench's."""
-    rate_hz: float | None = None
-    """Sample rate at a sound card, which runs at its own."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Further settings of the emulator (`rig.emulator.settings.EmulatorSettings`)."""
+    rate_hz: float | None = None
+    """Sample rate at a sound card, which runs at its own."""
 
     def scaled(self, bench: Bench) -> Bench:
         """Return the bench at the rate and with the block of this transport."""

@@ -3,10 +3,12 @@
 from typing import Any, NamedTuple
 
 from rig.drivers.sound.rates import RATES_HZ
-from rig.errors import DaqBusy, DaqDisconnected, DaqError, DaqRefused
+from rig.errors import DaqBusy, DaqDisconnected, DaqError, DaqRefused, DaqTimeout
 
 MISSING = "the package sounddevice is not installed (pip install 'vibrolock[sound]')"
 """What to do where the package is missing."""
+INITIALISATIONS = 3
+"""Attempts to initialise PortAudio; chosen: on a busy computer a JACK server may have no time for it."""
 
 
 class SoundDevice(NamedTuple):
@@ -65,10 +67,21 @@ def abandon(memory: object) -> None:
 
 
 def sound_devices() -> list[SoundDevice]:
-    """Return the devices there are now; PortAudio looks for them when it is initialised, so it is initialised anew."""
+    """Return the devices there are now; PortAudio looks for them when it is initialised, so it is initialised anew.
+
+    Raises `DaqTimeout` where an audio server does not answer.
+    """
     release()
     audio = library()
-    audio._initialize()
+    for attempt in reversed(range(INITIALISATIONS)):
+        try:
+            audio._initialize()
+            break
+        except audio.PortAudioError as error:
+            if not attempt:
+                raise DaqTimeout(
+                    f"PortAudio cannot begin, for its audio system or server does not answer: {error}"
+                ) from error
     names = [host["name"] for host in audio.query_hostapis()]
     return [
         SoundDevice(

@@ -1,5 +1,6 @@
 """Rows are measured: over an emulator, from the report on a device, and of a way that cannot be opened."""
 
+import sys
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -8,10 +9,11 @@ import pytest
 
 from rig.conformance.run import Finding
 from rig.drivers import make_daq
+from rig.emulator.sound import reaching_bench
 from rig.wire.messages import EmergencyStop
 from studies.matrix import measuring
 from studies.matrix.measuring import device_row, matrix_rows
-from studies.matrix.transports import Transport, is_arm, transports
+from studies.matrix.transports import Transport, at_rate, is_arm, transports
 from tests.rig.rigs import bench_with
 
 BENCH = bench_with()
@@ -184,3 +186,16 @@ def test_classical_can_has_half_the_rate_with_a_filter_below_it():
     assert bench.sample_rate_hz == 2500.0
     assert bench.driver.options["converter"]["anti_alias_hz"] == pytest.approx(1000.0)
     assert np.isclose(BENCH.sample_rate_hz, 5000.0)
+
+
+@pytest.mark.parametrize(("rate_hz", "block"), [(48000.0, 128), (12000.0, 32), (6000.0, 16)])
+def test_a_bench_at_a_sound_card_has_a_block_of_a_period_at_each_rate(rate_hz, block):
+    reaching = reaching_bench(BENCH, {"device": "structure", "device_rate_hz": 48000.0, "period_frames": 128})
+    bench = at_rate(reaching, rate_hz)
+    assert (bench.sample_rate_hz, bench.block) == (rate_hz, block)
+
+
+def test_a_sound_card_is_left_out_with_a_word_where_its_packages_are_missing(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "sounddevice", None)
+    assert not [way for way in transports() if way.wire == "sound"]
+    assert "left out: the emulated sound card: the package sounddevice is not installed" in capsys.readouterr().err

@@ -21,7 +21,7 @@ from rig.errors import (
     DaqWatchdog,
 )
 from tests.refused import refused
-from tests.rig.drivers.sound.card import RATE_HZ, Card
+from tests.rig.drivers.sound.card import RATE_HZ, Card, PortAudioError
 
 SCALE_V = 10.0
 TONE_HZ = 100.0
@@ -460,6 +460,26 @@ def test_a_cable_that_is_not_there_is_said(card):
     with pytest.raises(DaqError, match="does not come back"):
         daq.start(128)
     daq.close()
+
+
+@pytest.mark.parametrize(("failures", "begins"), [(2, True), (3, False)])
+def test_an_audio_server_that_has_no_time_is_asked_again_and_then_said_not_to_answer(card, failures, begins):
+    made, left = card(), [None] * failures
+
+    def initialise():
+        if left:
+            left.pop()
+            raise PortAudioError("Start thread error", -9999)
+        made._initialized += 1
+
+    made._initialize = initialise
+    daq = make_daq(bench())
+    if begins:
+        with daq:
+            daq.start(128)
+        return
+    with pytest.raises(DaqTimeout, match=r"does not answer: .*Start thread error"):
+        daq.open()
 
 
 def test_a_missing_package_is_said_in_one_line(monkeypatch):
