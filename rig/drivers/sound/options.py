@@ -36,7 +36,8 @@ class SoundOptions(WireOptions):
     calibrated: str = Field("", pattern=DATE)
     """Day on which ``rig calibrate`` has measured the channels, YYYY-MM-DD."""
     period_frames: int = Field(128, ge=16, le=8192)
-    """Frames that the audio system exchanges at once. Fewer shorten the delay and need a quieter computer."""
+    """Frames that the audio system exchanges at once. Fewer shorten the delay and need a quieter computer. Where a
+    block is shorter, ``queue_blocks = "auto"`` takes at least so many that they last for almost two periods."""
 
     @field_validator("inputs")
     @classmethod
