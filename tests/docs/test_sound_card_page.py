@@ -67,6 +67,7 @@ def ended(words):
     return out
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_page_lead_from_the_devices_to_a_figure_and_to_a_calibration(monkeypatch, tmp_path):
     own_sound_server(monkeypatch)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))  # no trip of another run
