@@ -13,12 +13,12 @@ import pytest
 
 pytest.importorskip("nidaqmx")
 
-import nidaqmx._lib as ni_library  # noqa: E402
+import nidaqmx._lib as ni_library
 
-from rig.drivers import make_daq  # noqa: E402
-from rig.errors import DaqDisconnected, DaqRefused  # noqa: E402
-from tests.refused import refused  # noqa: E402
-from tests.rig.rigs import bench_with  # noqa: E402
+from rig.drivers import make_daq
+from rig.errors import DaqDisconnected, DaqRefused
+from tests.refused import refused
+from tests.rig.rigs import bench_with
 
 RATE_HZ, BLOCK, AHEAD = 12_500.0, 50, 2
 AC, INTERNAL, CURRENT, SECONDS, NO_REGENERATION = 10045, 10200, 10134, 10364, 10158
