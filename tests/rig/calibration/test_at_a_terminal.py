@@ -14,8 +14,13 @@ from tests.rig.calibration.test_calibrate import BENCH, FULL_SCALE_V
 fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
 
 
-CABLES = "from tests.rig.calibration.test_calibrate import Cables, session; session.make_daq = Cables
-import rig.cli; rig.cli.main()"
+CABLES = """
+import rig.cli
+from tests.rig.calibration.test_calibrate import Cables, session
+
+session.make_daq = Cables
+rig.cli.main()
+"""
 """A process of the command with cables as its device."""
 
 
