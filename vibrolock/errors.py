@@ -1,27 +1,10 @@
 """Errors that carry their parts: what was given where, what is allowed, and what to do."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from itertools import takewhile
 from typing import Any, Self
 
 from vibrolock.printable import one_line, shown
-
-_UNITS = {
-    "hz": "Hz",
-    "1_s": "1/s",
-    "rad_s": "rad/s",
-    "m_s2": "m/s^2",
-    "s": "s",
-    "v": "V",
-    "n": "N",
-    "m": "m",
-    "deg": "deg",
-}
-"""Units of the endings of names."""
-_UNIT_WORDS = frozenset(
-    ["1", "a", "c", "deg", "hz", "j", "kg", "m", "m2", "m3", "n", "pa", "per", "rad", "s", "s2", "s3", "v"]
-)
-"""Words of which an ending that names a unit consists; one that is not among `_UNITS` is not shown."""
+from vibrolock.units import unit_of
 
 
 class StatedError(Exception):
@@ -138,13 +121,6 @@ class StatedError(Exception):
 
 class InputError(StatedError, ValueError):
     """An argument or a setting has a value that is not allowed."""
-
-
-def unit_of(field: str) -> str:
-    """Return the unit in which the name of a field ends, such as ``Hz`` of ``levels_hz[3]``; empty without one."""
-    words = field.partition("[")[0].split("_") if field.endswith("]") else field.split("_")
-    ending = [*takewhile(_UNIT_WORDS.__contains__, reversed(words[1:]))]
-    return _UNITS.get("_".join(reversed(ending)), "")
 
 
 def at_least(low: float, unit: str = "") -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from pydantic.json_schema import JsonSchemaValue
 
-from rig.text.units import titled
+from vibrolock.units import titled
 
 Schema = JsonSchemaValue
 """A JSON Schema, or a part of one."""

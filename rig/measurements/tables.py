@@ -12,7 +12,7 @@ from rig.campaigns.kinds import KINDS
 from rig.errors import RecordingError
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from rig.text.units import unit_of
+from vibrolock.units import unit_of
 
 if TYPE_CHECKING:
     import pandas

@@ -7,21 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrolock.units import unit_of
+
 Array = NDArray[Any]
 Labels = tuple[tuple[str, ...], ...]
 
-_SUFFIXES = {
-    **{"_rad_s": "rad/s", "_n_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m_s2": "m/s^2"},
-    **{"_hz": "Hz", "_n": "N", "_m": "m", "_kg": "kg", "_deg": "deg", "_s": "s", "_v": "V", "_rad": "rad"},
-    **{"modal_amplitude": "kg^0.5 m", "force_harmonics": "N", "shapes": "kg^-0.5"},
-}
+_NORMALISED = {"modal_amplitude": "kg^0.5 m", "force_harmonics": "N", "shapes": "kg^-0.5"}
+"""Units of arrays whose names do not end in theirs, by the end of the name."""
 
 
-def unit_of(name: str) -> str:
-    """Return an array's SI unit by the suffix of its name; 1 without one. ``x_std`` has the unit of ``x``."""
+def array_unit(name: str) -> str:
+    """Return an array's SI unit by the end of its name; 1 without one. ``x_std`` has the unit of ``x``."""
     for end in ("_std", "_low", "_high", "_total_power", "_uncorrected"):
         name = name.removesuffix(end)
-    return next((unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix)), "1")
+    return next((unit for end, unit in _NORMALISED.items() if name.endswith(end)), unit_of(name)) or "1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +38,13 @@ class Contents:
     rows: Mapping[str, int]
     """For every array that belongs in a table: the array's axis along the table's rows."""
     units: Mapping[str, str | Array] = field(default_factory=dict)
-    """Units of arrays: one, or several that broadcast to the axes other than the rows. Without an entry `unit_of` applies."""
+    """Units of arrays: one, or several that broadcast to the axes other than the rows. By default `array_unit`."""
     labels: Mapping[str, Labels] = field(default_factory=dict)
     """Names along the axes other than the rows."""
 
     def unit(self, name: str) -> str | Array:
         """Return the unit of an array, or the units of its columns."""
-        return self.units.get(name, unit_of(name))
+        return self.units.get(name, array_unit(name))
 
     def summary(self) -> dict[str, Any]:
         """Return kind, title, number of rows and names of the arrays."""

@@ -7,7 +7,7 @@ import pytest
 
 from identification import IdentificationError
 from rig.errors import ConfigurationError
-from vibrolock.errors import InputError, StatedError, at_least, unit_of
+from vibrolock.errors import InputError, StatedError, at_least
 
 
 @pytest.mark.parametrize(
@@ -60,21 +60,6 @@ def test_common_ranges_are_checked_in_a_line_and_nan_is_in_none():
         with pytest.raises(IdentificationError) as raised:
             check(value)
         assert (raised.value.field, raised.value.allowed) == ("x", allowed)
-
-
-@pytest.mark.parametrize(
-    ("field", "unit"),
-    [
-        ("levels_v[3]", "V"),
-        ("limits.force_n", "N"),
-        ("rate_1_s", "1/s"),
-        ("stiffness_n_m", ""),
-        ("response_integral_per_s", ""),
-        ("modes", ""),
-    ],
-)
-def test_the_unit_of_a_field_follows_from_its_name(field, unit):
-    assert unit_of(field) == unit
 
 
 def test_another_name_may_stand_in_place_of_the_field():

@@ -8,8 +8,8 @@ from pydantic.json_schema import JsonSchemaValue as Schema
 
 from rig.errors import ConfigurationError
 from rig.text.json_values import JsonValue
-from rig.text.units import unit_of
 from simulators import VirtualRig
+from vibrolock.units import unit_of
 
 _TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
 _BOUNDS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}

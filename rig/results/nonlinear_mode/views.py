@@ -11,7 +11,7 @@ from rig.drawing.curves import Curves, View, backbone_curves
 from rig.results.kind import Exchange, Table
 from rig.text.column import Column
 from rig.text.console import print_rows
-from rig.text.contents import Contents, Labels, unit_of
+from rig.text.contents import Contents, Labels, array_unit
 
 
 def _summarise(mode: NonlinearMode) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def _nonlinear_mode(mode: NonlinearMode) -> Contents:
     arrays, attributes = encode(mode)
     size = len(mode.force_n)
     rows = {name: 0 for name, array in arrays.items() if array.ndim and array.shape[0] == size}
-    units = np.array([unit_of(name) for name in QUANTITIES])
+    units = np.array([array_unit(name) for name in QUANTITIES])
     further = {"systematic_std": units, "random_std": units, "interval_95": units[:, None]}
     labels: dict[str, Labels] = dict.fromkeys(("systematic_std", "random_std"), (QUANTITIES,))
     labels |= {"interval_95": (QUANTITIES, ("low", "high"))}
