@@ -1,6 +1,7 @@
 """A complete control law: its parameters, its state, and the open-loop law for a frequency given by the plan."""
 
 import math
+from abc import abstractmethod
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +14,6 @@ from controller.harmonics.settings import HarmonicsSettings
 from controller.lock import LOCK, THRESHOLDS, LockRule
 from controller.period import PERIOD
 from controller.rest import REST, REST_STATE, estimate_steady_force, take_as_measured
-from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel
 
 LAW = np.dtype(
@@ -82,21 +82,40 @@ def control_state(law: np.ndarray) -> np.ndarray:
     return out
 
 
-class HarmonicsTable(Settings):
-    """The table of the harmonics loop, in any law."""
+class LawSettings(DetectorSettings, AmplitudeSettings):
+    """What any law has: detector, amplitude loop and the table of the harmonics loop."""
 
     harmonics: HarmonicsSettings | None = None
     """The harmonics loop: harmonics of the output that make those of the force zero, or what is prescribed. Without this table
     the output is a sine."""
 
-    def build_loop(self, sample_rate_hz: float, largest_v: float) -> np.ndarray:
-        """Return one record of `HARMONICS`, all zero without the table; see `HarmonicsSettings.build_harmonics`."""
-        if self.harmonics is None:
-            return np.zeros(1, HARMONICS)
-        return self.harmonics.build_harmonics(sample_rate_hz, largest_v)
+    def build(
+        self,
+        sample_rate_hz: float,
+        amplitude_law: AmplitudeLaw,
+        largest_v: float,
+        drive_mode_shape: float | None = None,
+    ) -> np.ndarray:
+        """Return the parameters for a sample rate: one record of `LAW`; see `Law`.
+
+        Raises ValueError if the frequency window reaches beyond a quarter of the sample rate, if the loop that should hold the
+        level has no gain, or if the mode shape is needed and missing.
+        """
+        out = np.zeros(1, LAW)
+        self.build_feedback(out, sample_rate_hz, drive_mode_shape)
+        out["detector"] = self.build_detector(sample_rate_hz)
+        gain, sees_rest = float(out["detector"]["gain"][0]), bool(out["rest"]["gain"][0] != 0.0)
+        out["amplitude"] = self.build_amplitude(amplitude_law, largest_v, 1.0 / sample_rate_hz, gain, sees_rest)
+        if self.harmonics is not None:
+            out["harmonics"] = self.harmonics.build_harmonics(sample_rate_hz, largest_v)
+        return out
+
+    @abstractmethod
+    def build_feedback(self, out: np.ndarray, sample_rate_hz: float, drive_mode_shape: float | None) -> None:
+        """Write the parameters of the lock and of the feedback to the frequency into a record of `LAW`."""
 
 
-class OpenLoop(HarmonicsTable, DetectorSettings, AmplitudeSettings):
+class OpenLoop(LawSettings):
     """Law without phase feedback: the plan gives the frequency. The level is a voltage or is held by an amplitude loop."""
 
     @property
@@ -109,21 +128,9 @@ class OpenLoop(HarmonicsTable, DetectorSettings, AmplitudeSettings):
         """The plan gives the frequency: 0."""
         return 0.0
 
-    def build(
-        self,
-        sample_rate_hz: float,
-        amplitude_law: AmplitudeLaw,
-        largest_v: float,
-        drive_mode_shape: float | None = None,
-    ) -> np.ndarray:
-        """Return the parameters for a sample rate: one record of `LAW`."""
-        out = np.zeros(1, LAW)
-        out["detector"] = self.build_detector(sample_rate_hz)
-        gain = float(out["detector"]["gain"][0])
-        out["amplitude"] = self.build_amplitude(amplitude_law, largest_v, 1.0 / sample_rate_hz, gain, False)
-        out["harmonics"] = self.build_loop(sample_rate_hz, largest_v)
+    def build_feedback(self, out: np.ndarray, sample_rate_hz: float, drive_mode_shape: float | None) -> None:
+        """Write the parameters of the lock; without feedback the others are zero."""
         out["lock"] = self.lock.build()
-        return out
 
 
 @inner_kernel

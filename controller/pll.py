@@ -10,13 +10,13 @@ from controller.amplitude import AmplitudeLaw, AmplitudeSettings
 from controller.delay import LARGEST_TURN_DEG, highest_crossover_rad_s, longest_delay_s
 from controller.detector import DetectorSettings
 from controller.frequency import GAINS, FrequencySettings
-from controller.law import LAW, HarmonicsTable
+from controller.law import LawSettings
 from controller.lock import LockRule
 from controller.rest import RestSettings
 from vibrolock.errors import InputError
 
 
-class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorSettings, AmplitudeSettings):
+class PhaseLockedLoop(LawSettings, FrequencySettings, RestSettings, DetectorSettings, AmplitudeSettings):
     """Gains and bounds of the loop; `build` turns them into the record that the kernels read."""
 
     lock: LockRule = LockRule()
@@ -93,25 +93,9 @@ class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorS
             out.append((("response_integral_per_s",), (0.0, self.response_integral_per_s), False))
         return out
 
-    def build(
-        self,
-        sample_rate_hz: float,
-        amplitude_law: AmplitudeLaw,
-        largest_v: float,
-        drive_mode_shape: float | None = None,
-    ) -> np.ndarray:
-        """Return the parameters for a sample rate: one record of `controller.law.LAW`; see `controller.law.Law`.
-
-        Raises ValueError if the window reaches beyond a quarter of the sample rate, if the loop that should hold the level has
-        no gain, or if the mode shape is needed and missing.
-        """
+    def build_feedback(self, out: np.ndarray, sample_rate_hz: float, drive_mode_shape: float | None) -> None:
+        """Write the parameters of lock, frequency law and estimator of the rest into a record of `controller.law.LAW`."""
         shape = self.drive_mode_shape or drive_mode_shape
-        out = np.zeros(1, LAW)
         out["frequency"] = self.build_frequency(sample_rate_hz, shape, self.proportional_and_integral())
         out["rest"] = self.build_rest(sample_rate_hz, shape)
-        out["detector"] = self.build_detector(sample_rate_hz)
-        gain, sees_rest = float(out["detector"]["gain"][0]), bool(out["rest"]["gain"][0] != 0.0)
-        out["amplitude"] = self.build_amplitude(amplitude_law, largest_v, 1.0 / sample_rate_hz, gain, sees_rest)
-        out["harmonics"] = self.build_loop(sample_rate_hz, largest_v)
         out["lock"] = self.lock.build()
-        return out
