@@ -1,6 +1,6 @@
 """Checks that every measurement type of this package shares."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,13 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from identification.errors import IdentificationError
 
 
-def read_only(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
+def convert_fields(of: object, convert: Callable[[Any], object], *names: str) -> None:
+    """Replace fields of a frozen dataclass that is being made by what ``convert`` returns of them."""
+    for name in names:
+        object.__setattr__(of, name, convert(getattr(of, name)))
+
+
+def read_only(values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArray[Any]:
     """Return a copy of ``values`` as a read-only array."""
     array = np.array(values, dtype=dtype)
     array.setflags(write=False)

@@ -23,7 +23,6 @@ def continued(
     direction: float = 1.0,
     lowest: float = -np.inf,
     highest: float = np.inf,
-    largest_size: float = np.inf,
     points: int = 1000,
     steps: Steps | None = None,
     stop: Callable[[Float, float], str] | None = None,
@@ -45,8 +44,6 @@ def continued(
         Sign of the first change of the parameter.
     lowest, highest
         Range of the parameter.
-    largest_size
-        Allowed ``|z / scale|``.
     points
         Largest number of points.
     steps
@@ -86,8 +83,6 @@ def continued(
         elif not lowest <= new.v[-1] <= highest:
             ending = "range"
             new = walk.at_parameter(last, new, lowest if new.v[-1] < lowest else highest)
-        elif float(np.linalg.norm(new.v[:-1] / size)) > largest_size:
-            ending, new = "size", None
         if new is None:
             break
         if new.tangent[-1] * last.tangent[-1] < 0.0 and (turn := walk.turn(last, step)) is not None:

@@ -13,7 +13,7 @@ from vibrolock.arrays import Float
 
 System = Callable[[Float, float], tuple[Float, Float, Float]]
 """``F(z, p)`` float[n] with its derivatives float[n, n] with respect to z and float[n] with respect to p."""
-Ending = Literal["range", "size", "closed", "points", "step", "stopped"]
+Ending = Literal["range", "closed", "points", "step", "stopped"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,9 +60,8 @@ class Path:
     turning_after: NDArray[np.int64]
     """int[k], index of the last point before each turning point."""
     ending: Ending
-    """Why the path ends. ``range``: the parameter reached the end of its range, where the last point lies. ``size``:
-    the unknowns exceeded the allowed size. ``closed``: the path returned to its first point, which is also its last.
-    ``points``: the largest number of points was reached. ``step``: even the shortest step failed. ``stopped``: the
-    function ``stop`` ended it."""
+    """Why the path ends. ``range``: the parameter reached the end of its range, where the last point lies. ``closed``:
+    the path returned to its first point, which is also its last. ``points``: the largest number of points was reached.
+    ``step``: even the shortest step failed. ``stopped``: the function ``stop`` ended it."""
     reason: str = ""
     """Text that ``stop`` returned; empty otherwise."""

@@ -65,8 +65,7 @@ class VoltagePath:
     coupling_hz: float = 0.0
 
     def __post_init__(self) -> None:
-        if not self.sample_rate_hz > 0.0:
-            raise IdentificationError(field="sample_rate_hz", value=self.sample_rate_hz, allowed="above zero")
+        IdentificationError.unless_above("sample_rate_hz", self.sample_rate_hz, 0.0)
         for name in ("delay_s", "dispersion_s3", "coupling_hz"):
             if not np.isfinite(getattr(self, name)):
                 raise IdentificationError(field=name, value=getattr(self, name), allowed="finite")

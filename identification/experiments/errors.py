@@ -11,7 +11,7 @@ from identification.experiments.checks import belongs, check_not_zero
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulation import Simulation
 from identification.experiments.simulators import Simulator, simulated
-from identification.validation import read_only
+from identification.validation import convert_fields, read_only
 from vibrolock.arrays import Float
 
 
@@ -45,8 +45,7 @@ class PnlssErrors:
     levels: Float
 
     def __post_init__(self) -> None:
-        for name in ("relative", "rms", "range_use", "levels"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+        convert_fields(self, read_only, "relative", "rms", "range_use", "levels")
         object.__setattr__(self, "bounded", read_only(self.bounded, np.bool_))
 
     @property

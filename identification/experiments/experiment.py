@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
-from identification.validation import finite_array, positive
+from identification.validation import convert_fields, finite_array, positive
 from vibrolock.arrays import Float
 
 InitialState = Literal["zero", "estimated"]
@@ -69,8 +69,7 @@ class Experiment:
     output_noise: Float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("input_channels", "output_channels"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        convert_fields(self, tuple, "input_channels", "output_channels")
         where = f"experiment '{self.name}', " if self.name else ""
         refused = partial(IdentificationError, where=where)
         for name, channels in (("inputs", self.input_channels), ("outputs", self.output_channels)):

@@ -87,7 +87,7 @@ def _experiment(
     if records.period_samples:
         periods = resampled_periods(record.samples, records.period_samples, records.sample_rate_hz, rate_hz)
         size = periods.shape[-1]
-        noise = _noise(periods[list(out)])
+        noise = mean_noise(periods[list(out)], size)
         ahead = round(records.ahead_periods * size)
         band = band or _band(periods[list(into)].mean(axis=1), rate_hz)
         values = periods.mean(axis=1)[:, np.arange(-ahead, size) % size]
@@ -139,12 +139,15 @@ def resampled_periods(samples: Float, period_samples: int, rate_hz: float, new_r
     return np.asarray(np.fft.irfft(lines, size, axis=-1) * (size / period_samples))
 
 
-def _noise(periods: Float) -> Float | None:
-    """Return the standard errors of the mean's lines (peak), float[n_outputs, n_lines]; None for a single period."""
-    count, size = periods.shape[1:]
+def mean_noise(periods: Float, size: int) -> Float | None:
+    """Return the standard errors of the mean's lines (peak) below half of ``size`` per period, float[n_channels, n_lines].
+
+    ``periods`` are float[n_channels, n_periods, n]. Returns None for a single period.
+    """
+    count = periods.shape[1]
     if count < 2:
         return None
-    lines = np.fft.rfft(periods, axis=-1)[..., 1 : (size + 1) // 2] * (2.0 / size)
+    lines = np.fft.rfft(periods, axis=-1)[..., 1 : (size + 1) // 2] * (2.0 / periods.shape[-1])
     scatter = np.abs(lines - lines.mean(axis=1, keepdims=True)) ** 2
     return np.asarray(np.sqrt(scatter.sum(axis=1) / ((count - 1) * count)))
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.storage import stored
-from identification.validation import finite_array, positive
+from identification.validation import convert_fields, finite_array, positive
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
@@ -97,8 +97,7 @@ class TimeRecords(Result):
     notes: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        for name in ("channels", "records", "notes"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        convert_fields(self, tuple, "channels", "records", "notes")
         positive("sample_rate_hz", self.sample_rate_hz, "Hz")
         names = [channel.name for channel in self.channels]
         if twice := next((name for name in names if names.count(name) > 1), None):

@@ -121,8 +121,7 @@ def hammer_test(
 
 
 def _check(channels: tuple[Channel, ...], full_scale: Mapping[str, float], estimator: str) -> None:
-    if estimator not in ("H1", "H2", "Hv"):
-        raise IdentificationError(field="estimator", value=estimator, allowed="H1, H2, Hv")
+    IdentificationError.unless_one_of("estimator", estimator, ("H1", "H2", "Hv"))
     known = [channel.name for channel in channels]
     for name, value in full_scale.items():
         if name not in known:

@@ -138,7 +138,6 @@ def _note(path: Path, begin_hz: float, end_hz: float) -> str:
         "points": "it has all points that it may have",
         "closed": "it closed on itself",
         "step": "no solution was found farther on",
-        "size": "it is too large",
     }[path.ending]
     return f"the response from {begin_hz:.4g} Hz ends at {where}: {why}"
 

@@ -56,8 +56,7 @@ class ModeShapes:
         if not shapes.shape[1] or np.linalg.matrix_rank(shapes) < shapes.shape[1]:
             reason = f"{shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes"
             raise IdentificationError(reason, field="shapes")
-        if not 0 <= self.mode < shapes.shape[1]:
-            raise IdentificationError(field="mode", value=self.mode, allowed=f"0 to {shapes.shape[1] - 1}")
+        IdentificationError.unless_between("mode", self.mode, 0, shapes.shape[1] - 1)
 
     @property
     def tested(self) -> Float:

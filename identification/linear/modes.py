@@ -22,7 +22,7 @@ from identification.errors import IdentificationError
 from identification.linear.mode_shapes import ModeShapes
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.storage import stored
-from identification.validation import finite_array, table_rows
+from identification.validation import convert_fields, finite_array, table_rows
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -102,8 +102,7 @@ class LinearModes(Result):
     force_unit: str = "N"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", tuple(self.channels))
-        object.__setattr__(self, "notes", tuple(self.notes))
+        convert_fields(self, tuple, "channels", "notes")
         find_role(self.channels, "drive")
         modes, rows = np.size(self.frequency_hz), len(self.channels)
         parameters = modes * (2 + rows)

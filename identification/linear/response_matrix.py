@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
-from identification.validation import finite_array, shaped_array
+from identification.validation import convert_fields, finite_array, shaped_array
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -60,8 +60,7 @@ class FrequencyResponseMatrix(Result):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("outputs", "inputs", "input_rms", "notes"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        convert_fields(self, tuple, "outputs", "inputs", "input_rms", "notes")
         if not self.outputs or not self.inputs:
             raise IdentificationError(field="outputs, inputs", allowed="at least one of each")
         object.__setattr__(self, "frequency_hz", finite_array("frequency_hz", self.frequency_hz, np.float64, 1))

@@ -140,8 +140,7 @@ def response_band(
     seed
         Seed of the random numbers.
     """
-    if draws < 20:
-        raise IdentificationError(field="draws", value=draws, allowed="at least 20")
+    IdentificationError.unless_at_least("draws", draws, 20)
     found = dynamic_model(model)
     return band_of_responses(
         frequency_response(

@@ -73,12 +73,8 @@ class MultisineDesign:
         positive("rms", self.rms)
         IdentificationError.unless_at_least("period_samples", self.period_samples, 3)
         IdentificationError.unless_one_of("grid", self.grid, get_args(Grid))
-        if self.detection_group < 2:
-            raise IdentificationError(
-                field="detection_group", value=self.detection_group, allowed="at least 2 odd lines"
-            )
-        if self.grid_seed < 0:
-            raise IdentificationError(field="grid_seed", value=self.grid_seed, allowed="zero or more")
+        IdentificationError.unless_at_least("detection_group", self.detection_group, 2)
+        IdentificationError.unless_at_least("grid_seed", self.grid_seed, 0)
         if self.highest_hz < self.lowest_hz:
             raise IdentificationError(
                 field="highest_hz", value=self.highest_hz, allowed=f"lowest_hz = {self.lowest_hz:g} Hz"

@@ -16,7 +16,7 @@ from identification.channels import Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.multisine.design import MultisineDesign
 from identification.multisine.estimators import estimated_responses
-from identification.validation import finite_array
+from identification.validation import convert_fields, finite_array
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -77,8 +77,7 @@ class PeriodicSpectra(Result):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", tuple(self.channels))
-        object.__setattr__(self, "notes", tuple(self.notes))
+        convert_fields(self, tuple, "channels", "notes")
         if all(channel.role != "force" for channel in self.channels):
             find_role(self.channels, "force")
         object.__setattr__(self, "frequency_hz", finite_array("frequency_hz", self.frequency_hz, np.float64, 1))
@@ -179,8 +178,7 @@ def periodic_spectra(
         Periods at the beginning of every record that had not settled and are left out.
     """
     IdentificationError.raise_if(not len(records), "is empty", field="records", allowed="at least one realisation")
-    if transient_periods < 0:
-        raise IdentificationError(field="transient_periods", value=transient_periods, allowed="zero or more")
+    IdentificationError.unless_at_least("transient_periods", transient_periods, 0)
     size, spectra = design.period_samples, []
     for number, record in enumerate(records):
         data = finite_array(f"records[{number}]", record, np.float64, 2)

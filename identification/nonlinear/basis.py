@@ -62,8 +62,7 @@ def shapes_for(
 def _tested(modes: LinearModes, backbone: Backbone, mode: int | None) -> int:
     count = modes.frequency_hz.size
     if mode is not None:
-        if not 0 <= mode < count:
-            raise IdentificationError(field="mode", value=mode, allowed=f"0 to {count - 1}")
+        IdentificationError.unless_between("mode", mode, 0, count - 1)
         return mode
     start_hz = float(backbone.frequency_hz[int(np.argmin(backbone.amplitude_m))])
     away = np.abs(modes.frequency_hz / start_hz - 1.0)

@@ -85,8 +85,7 @@ class Repeatability:
         return table_rows(columns)
 
     def _runs(self, quantity: str) -> Float:
-        if quantity not in ("modal_frequency_hz", "damping_ratio"):
-            raise IdentificationError(field="quantity", value=quantity, allowed="modal_frequency_hz, damping_ratio")
+        IdentificationError.unless_one_of("quantity", quantity, ("modal_frequency_hz", "damping_ratio"))
         return np.asarray(getattr(self, quantity))
 
 

@@ -12,7 +12,7 @@ from identification.fitting.threads import threads
 from identification.models.simulated_runs import run_of
 from identification.scatter.shifts import Effect, Scattered, shifted
 from identification.scatter.widths import Width
-from identification.validation import read_only
+from identification.validation import convert_fields, read_only
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
@@ -73,8 +73,7 @@ class RunScatter(Result):
     settled: bool
 
     def __post_init__(self) -> None:
-        for name in ("shifts", "estimates", "variances", "misfit"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+        convert_fields(self, read_only, "shifts", "estimates", "variances", "misfit")
 
     def model_of(self, model: Scattered, run: str) -> Scattered:
         """Return the model of one of the runs. Raises `IdentificationError` if there is none of this name."""

@@ -266,8 +266,7 @@ def _skew(skew_samples: ArrayLike | None, channels: int) -> Float:
 def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_period: int) -> Float:
     """float[n]: equidistant phases at which the window is complete; raises `IdentificationError` for an unusable phase."""
     IdentificationError.unless_at_least("harmonics", harmonics, 1)
-    if not fit_periods >= _MIN_FIT_PERIODS:
-        raise IdentificationError(field="fit_periods", value=fit_periods, allowed=f"at least {_MIN_FIT_PERIODS:g}")
+    IdentificationError.unless_at_least("fit_periods", fit_periods, _MIN_FIT_PERIODS)
     IdentificationError.unless_at_least("points_per_period", points_per_period, 1)
     steps = rising_steps(theta)
     covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0

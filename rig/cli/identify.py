@@ -47,8 +47,7 @@ class IdentifyGroup(KindGroup):
         files, kind, known = values.pop("files"), word or values.pop("kind"), self.kinds()
         given = given_in(values, known[kind].options if kind in known else None, output)
         keep_existing([*files, *given.get("validation", ())], output, overwrite or "resume" in given)
-        if kind not in known:
-            raise ConfigurationError(field="kind", value=kind, allowed=known)
+        ConfigurationError.unless_one_of("kind", kind, known)
         options = known[kind].options(**given)
         with escalating() as signals:
             lines = FitLines(signals.check)

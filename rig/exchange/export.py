@@ -39,8 +39,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     `rig.measurements`) or ``time``: the samples of its ``points`` by their stored numbers, from 0; if empty, of all recorded.
     Raises `RecordingError` if the file cannot be read, or does not contain such points or data.
     """
-    if data not in DATA:
-        raise ConfigurationError(field="data", value=data, allowed=f"{' or '.join(DATA)}")
+    ConfigurationError.unless_one_of("data", data, DATA)
     kind = kind_of(path)
     if kind in CAMPAIGNS:
         with Recording(path) as recording:

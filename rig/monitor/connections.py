@@ -40,7 +40,23 @@ class _Deadline:
             self._timer = None
 
 
-class WebConnection(H11Protocol):
+class _Unread(asyncio.Protocol):
+    """A connection that is given up if its client does not read for too long."""
+
+    _stuck: _Deadline
+
+    def pause_writing(self) -> None:
+        """The client does not read."""
+        super().pause_writing()
+        self._stuck.start()
+
+    def resume_writing(self) -> None:
+        """It reads again."""
+        super().resume_writing()
+        self._stuck.call_off()
+
+
+class WebConnection(_Unread, H11Protocol):
     """A connection for HTTP. Without a key there is one answer on it."""
 
     def __init__(
@@ -82,16 +98,6 @@ class WebConnection(H11Protocol):
     def _shows_key(self) -> bool:
         return self._keys.known(Headers(raw=self.headers)) or self._keys.in_query(self.scope["query_string"])
 
-    def pause_writing(self) -> None:
-        """The client does not read."""
-        super().pause_writing()
-        self._stuck.start()
-
-    def resume_writing(self) -> None:
-        """It reads again."""
-        super().resume_writing()
-        self._stuck.call_off()
-
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""
         self._request.call_off()
@@ -104,7 +110,7 @@ class WebConnection(H11Protocol):
             self.transport.abort()
 
 
-class FeedConnection(WebSocketsSansIOProtocol):
+class FeedConnection(_Unread, WebSocketsSansIOProtocol):
     """A connection that has become a socket."""
 
     visit: Visit | None = None
@@ -113,16 +119,6 @@ class FeedConnection(WebSocketsSansIOProtocol):
         """Take over a connection."""
         super().connection_made(transport)
         self._stuck = _Deadline(STUCK_S, self.transport.abort)
-
-    def pause_writing(self) -> None:
-        """The client does not read."""
-        super().pause_writing()
-        self._stuck.start()
-
-    def resume_writing(self) -> None:
-        """It reads again."""
-        super().resume_writing()
-        self._stuck.call_off()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""

@@ -31,8 +31,7 @@ _MOVES_A_SITE = 0.01
 
 def held_force(quantity: Quantity) -> Held:
     """Return the name of the condition that holds a force, by its fundamental or its RMS."""
-    if quantity not in ("fundamental", "rms"):
-        raise InputError(field="quantity", value=quantity, allowed="fundamental or rms")
+    InputError.unless_one_of("quantity", quantity, ("fundamental", "rms"))
     return "force" if quantity == "fundamental" else "force-rms"
 
 

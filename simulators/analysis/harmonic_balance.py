@@ -70,8 +70,7 @@ def phase_resonance_backbone(
         the higher harmonics contribute; increase ``harmonics`` if that is too much.
     """
     held, values = levels(forces_n, voltages_v, amplitudes_m)
-    if excitation not in ("exciter", "pure-sine"):
-        raise InputError(field="excitation", value=excitation, allowed="exciter or pure-sine")
+    InputError.unless_one_of("excitation", excitation, ("exciter", "pure-sine"))
     held_as = held_force(quantity)
     if excitation == "pure-sine" and held == "voltage":
         raise InputError("allowed with excitation = 'exciter', a pure sine has forces_n", field="voltages_v")

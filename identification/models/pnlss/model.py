@@ -18,7 +18,7 @@ from identification.linear.subspace import StateSpace
 from identification.models.pnlss.features import Features
 from identification.models.pnlss.kernels import Matrices, simulate, workspace
 from identification.storage import stored
-from identification.validation import finite_array, positive, read_only
+from identification.validation import convert_fields, finite_array, positive, read_only
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
@@ -87,13 +87,11 @@ class PnlssModel(Result):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("inputs", "outputs", "training", "notes"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        convert_fields(self, tuple, "inputs", "outputs", "training", "notes")
         positive("sample_rate_hz", self.sample_rate_hz, "Hz")
         for name in MATRICES:
             object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, 2))
-        for name in ("state_range", "input_range"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+        convert_fields(self, read_only, "state_range", "input_range")
         n, m, outputs = self.a.shape[0], len(self.inputs), len(self.outputs)
         expected: dict[str, tuple[int, ...]] = {
             "a": (n, n),

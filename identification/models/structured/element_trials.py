@@ -10,6 +10,7 @@ from identification.experiments.errors import errors_of
 from identification.experiments.experiment import Experiment
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.model import StructuredModel
+from identification.validation import convert_fields
 from vibrolock.arrays import Float
 
 _SURE = 0.95
@@ -37,8 +38,7 @@ class ElementPlan:
     between: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("laws", "between"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        convert_fields(self, tuple, "laws", "between")
         IdentificationError.raise_if(not self.laws, "is empty", field="laws", allowed="one at least")
         if len(self.between) > 2 or len(set(self.between)) < len(self.between):
             raise IdentificationError(

@@ -9,7 +9,7 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.models.structured.laws import Damper, Joint, Law, Spring
 from identification.storage import stored
-from identification.validation import finite_array, positive
+from identification.validation import convert_fields, finite_array, positive
 from vibrolock.arrays import Complex, Float
 
 NODES = 513
@@ -57,8 +57,7 @@ class NonlinearElement:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", finite_array("element: direction", self.direction, np.float64, 1))
-        object.__setattr__(self, "laws", tuple(self.laws))
-        object.__setattr__(self, "between", tuple(self.between))
+        convert_fields(self, tuple, "laws", "between")
         for name in ("scale_m", "reach"):
             object.__setattr__(self, name, positive(f"element: {name}", getattr(self, name)))
         if self.largest is not None:

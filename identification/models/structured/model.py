@@ -19,7 +19,7 @@ from identification.models.structured.nudging import (
     with_lead_in_periods,
 )
 from identification.models.structured.steps import System, Workspace, run
-from identification.validation import finite_array, positive, shaped_array
+from identification.validation import convert_fields, finite_array, positive, shaped_array
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
@@ -116,8 +116,7 @@ class StructuredModel(Result):
     training: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("elements", "inputs", "outputs", "training"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        convert_fields(self, tuple, "elements", "inputs", "outputs", "training")
         for name in ("sample_rate_hz", "support_corner_hz", "support_largest_n"):
             object.__setattr__(self, name, positive(name, getattr(self, name)))
         modes, inputs, outputs = np.size(self.frequency_hz), len(self.inputs), len(self.outputs)
@@ -261,10 +260,6 @@ class StructuredModel(Result):
         use = np.max([self.simulate_experiment(one).reach_use for one in experiments], axis=0)
         known = zip(self.elements, use.tolist(), strict=True)
         return replace(self, elements=tuple(replace(e, largest=share * e.reach) for e, share in known))
-
-    def with_steps(self, steps: int) -> "StructuredModel":
-        """Return the model with another number of steps in a sample."""
-        return replace(self, steps=steps)
 
 
 def outputs_of(model: StructuredModel, u: Float, states: Float) -> Float:

@@ -87,8 +87,7 @@ def experiments(
     IdentificationError.unless_one_of("periods", periods, get_args(Periods))
     if transient_periods is not None and not 0.0 <= transient_periods < math.inf:
         raise IdentificationError(field="transient_periods", value=transient_periods, allowed="zero or more")
-    if segment_periods < FEWEST_PERIODS:
-        raise IdentificationError(field="segment_periods", value=segment_periods, allowed=f"{FEWEST_PERIODS} at least")
+    IdentificationError.unless_at_least("segment_periods", segment_periods, FEWEST_PERIODS)
     bench = bench_of_recording(recording)
     try:
         signals = Signals.chosen(bench, inputs, outputs)

@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 
 from identification import Experiment, IdentificationError
+from identification.experiments import mean_noise
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, result_of
 from rig.campaigns.evaluation.vibrations import channel_factors
@@ -37,7 +38,7 @@ def realisation(
     size = samples_of_a_period(plan, bench, rate_hz)
     noise = None
     if periods == "mean":
-        noise = _noise(recorded, size)
+        noise = mean_noise(recorded, size)
         if noise is not None:
             hz = np.arange(1, noise.shape[1] + 1) * bench.sample_rate_hz / recorded.shape[-1]
             noise[:-1] *= np.abs(channel_factors(bench, hz))
@@ -57,19 +58,6 @@ def realisation(
         excited_hz=(plan.lowest_hz, plan.highest_hz),
         output_noise=noise,
     )
-
-
-def _noise(periods: np.ndarray, size: int) -> np.ndarray | None:
-    """Return the standard errors of the mean's lines (peak) below half of ``size``, float[n_channels + 1, n_lines].
-
-    ``periods`` are float[n_channels + 1, n_periods, n]. Returns None for a single period.
-    """
-    count = periods.shape[1]
-    if count < 2:
-        return None
-    lines = np.fft.rfft(periods, axis=-1)[..., 1 : (size + 1) // 2] * (2.0 / periods.shape[-1])
-    scatter = np.abs(lines - lines.mean(axis=1, keepdims=True)) ** 2
-    return np.asarray(np.sqrt(scatter.sum(axis=1) / ((count - 1) * count)))
 
 
 def samples_of_a_period(plan: MultisinePlan, bench: Bench, rate_hz: float) -> int:

@@ -142,8 +142,7 @@ def improve_into(
 
 def twin_into(request: RehearsalRequest, number: int, output: Path) -> dict[str, float]:
     """Write the twin of a draw (counted from 1) as a bench file; return its unknowns."""
-    if not 1 <= number <= request.draws:
-        raise ConfigurationError(field="twin", value=number, allowed=f"1 to {request.draws}")
+    ConfigurationError.unless_between("twin", number, 1, request.draws)
     twin = request.twin(number - 1)
     unknowns = [f"{name} = {value:.6g}" for name, value in twin.unknowns.items()]
     write_bench(twin.bench, output, [f"{twin.bench.description}; run it with seed {twin.number}", *unknowns])

@@ -107,9 +107,6 @@ def test_a_path_ends_where_it_was_told_to() -> None:
         return continued(cubic, [-3.0], -18.0, parameter_scale=5.0, **more)  # type: ignore[arg-type]
 
     assert end(highest=0.0).parameter[-1] == 0.0
-    small = end(largest_size=3.2, direction=-1.0)
-    assert small.ending == "size"
-    assert np.abs(small.unknowns).max() <= 3.2
     few = end(points=7)
     assert (few.ending, few.parameter.size) == ("points", 7)
     stopped = end(stop=lambda z, p: "too far" if p > 0.0 else "")

@@ -131,7 +131,7 @@ def test_a_model_goes_to_csv_for_a_spreadsheet(command, backbone_file, tmp_path)
     [
         ("export {file} -o x.xls", 1, "x.xls: the ending says no format; give --to, one of mat, uff, csv"),
         ("export {file} --to xls -o x", 1, "--to = 'xls'; allowed: mat, uff, csv"),
-        ("export {file} --data raw -o x.mat", 1, "--data = 'raw'; allowed: results or time"),
+        ("export {file} --data raw -o x.mat", 1, "--data = 'raw'; allowed: results, time"),
         ("export {file} --data time --point 9 -o x.mat", 1, "point 9: nothing was recorded of it; there are 1, 2"),
         ("export {file} --data time --point 0 -o x.mat", 2, "--point"),
         ("export {file} --item 3 -o x.mat", 1, "--item = 3"),

@@ -180,7 +180,7 @@ def test_the_rate_is_a_round_number_near_25_a_period_and_at_most_the_recordings(
         ({"outputs": []}, {"says": "none-given", "field": "outputs"}),
         ({"periods": "some"}, {"field": "periods", "value": "some", "allowed": "mean, all"}),
         ({"transient_periods": -1.0}, {"field": "transient_periods", "value": -1.0}),
-        ({"segment_periods": 3}, {"field": "segment_periods", "value": 3, "allowed": "8 at least"}),
+        ({"segment_periods": 3}, {"field": "segment_periods", "value": 3, "allowed": "8 and above"}),
     ],
 )
 def test_what_cannot_be_is_refused_by_name(multisine, asked, said):

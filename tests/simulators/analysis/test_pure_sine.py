@@ -82,5 +82,5 @@ def test_what_a_pure_sine_cannot_be_given_is_named() -> None:
     rig = VirtualRig.shipped("magnet-beam")
     with refused(ValueError, "allowed-with-excitation-exciter", field="voltages_v"):
         phase_resonance_backbone(rig, voltages_v=[1.0], excitation="pure-sine")
-    with refused(ValueError, field="excitation", value="square", allowed="exciter or pure-sine"):
+    with refused(ValueError, field="excitation", value="square", allowed="exciter, pure-sine"):
         phase_resonance_backbone(rig, forces_n=[1.0], excitation="square")

@@ -11,7 +11,7 @@ from identification.errors import IdentificationError
 from identification.fitting.result import FitResult, upgrade_fit
 from identification.models.pnlss.model import PnlssModel
 from identification.storage import stored
-from identification.validation import read_only
+from identification.validation import convert_fields, read_only
 from vibrolock.arrays import Float
 
 OutputWeighting = Literal["rms", "none"]
@@ -148,8 +148,7 @@ class FitHistory:
     seconds: Float
 
     def __post_init__(self) -> None:
-        for name in ("training_error", "validation_error", "damping", "seconds"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+        convert_fields(self, read_only, "training_error", "validation_error", "damping", "seconds")
 
     def with_iterate(self, training: float, validation: float, damping: float, seconds: float) -> "FitHistory":
         """Return the history with one more iterate."""
@@ -236,8 +235,7 @@ class PnlssFit(FitResult):
     settings: FitSettings
 
     def __post_init__(self) -> None:
-        for name in ("initial_states", "last_initial_states", "state_scale"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+        convert_fields(self, read_only, "initial_states", "last_initial_states", "state_scale")
 
     @property
     def training_error(self) -> float:

@@ -279,7 +279,7 @@ def test_rms_and_bands_need_what_they_are_made_of() -> None:
         frequency_response(bare, 0.5, force="rms")
     with refused(IdentificationError, "unknown-at-some-level", field="damping_ratio_std"):
         response_band(replace(mode_with(Q), damping_ratio_std=np.full(Q.size, np.nan)), 0.5)
-    with refused(IdentificationError, field="draws", value=5, allowed="at least 20"):
+    with refused(IdentificationError, field="draws", value=5, allowed="20 and above"):
         response_band(mode_with(Q), 0.5, draws=5)
 
 

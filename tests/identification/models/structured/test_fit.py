@@ -106,7 +106,7 @@ def test_standard_errors_hold_white_noise():
 
 def test_errors_of_the_steps_are_in_the_covariance():
     """Data of short steps, without noise, fitted with long ones: the standard errors are the errors, which the steps make."""
-    found = fit_structured(linear_modes(TRUE, 1), [experiment(TRUE.with_steps(40))], support=False, steps=4)
+    found = fit_structured(linear_modes(TRUE, 1), [experiment(replace(TRUE, steps=40))], support=False, steps=4)
     std, of = np.sqrt(np.diag(found.covariance)), {name: number for number, name in enumerate(found.names)}
     for name, truth in (("damping 1", np.log(0.01)), ("shape 1 at force", 0.9), ("shape 1 at tip", 1.4)):
         assert abs(found.values[of[name]] - truth) == pytest.approx(std[of[name]], rel=0.1), name
@@ -115,7 +115,7 @@ def test_errors_of_the_steps_are_in_the_covariance():
 def test_steps_make_damping_appear_larger():
     """Midpoint steps of length h multiply rates of decay by ``sin(w h)/(w h)``; a fit makes up for it."""
     linear = beam(elements=(), support_n_m=0.0)
-    data = [experiment(linear.with_steps(40))]
+    data = [experiment(replace(linear, steps=40))]
     laws = (PolynomialSpring((0.0,)),)
     found = fit_structured(linear_modes(linear, 1), data, laws=laws, support=False, steps=4)
     expected, number = (linear.omega[0] / (4.0 * RATE_HZ)) ** 2 / 6.0, found.names.index("damping 1")
