@@ -17,23 +17,21 @@ class HippoldGains:
 
     law: PhaseLaw
     """The gains."""
-    poles_rad_s: tuple[complex, complex, complex]
-    """Poles of the idealised loop (1/s)."""
     failed: tuple[str, ...]
     """Assumptions of the closed form that do not hold on this plant; empty if the closed form may be used."""
 
 
-def hippold_gains(plant: PlantModel, low_pass_rad_s: float, *, imaginary_part: float = 0.0) -> HippoldGains:
+def hippold_gains(plant: PlantModel, low_pass_rad_s: float) -> HippoldGains:
     """Return the closed-form gains of the phase PI law at phase resonance.
 
     Let ds = D w_0 be the decay of the structure's mode, dp the decay of the coupled pole, and db = dp/w_LP. dp is D_p w_p as
-    measured in the coupled plant; a further factor 1 + mu would count the exciter's mass twice. The idealised loop has the
-    poles ``w_LP (lR, lR +- i lI)`` with ``lR = -(1 + db)/3`` for
+    measured in the coupled plant; a further factor 1 + mu would count the exciter's mass twice. The idealised loop has a
+    triple pole ``w_LP lR`` with ``lR = -(1 + db)/3``, which is conservative, for
 
-        ``kp = w_LP (ds/dp)(3 lR^2 + lI^2 - db)``,  ``ki = w_LP^2 (ds/dp)(-lR)(lR^2 + lI^2)``.
+        ``kp = w_LP (ds/dp)(3 lR^2 - db)``,  ``ki = w_LP^2 (ds/dp)(-lR^3)``.
 
-    ``imaginary_part`` is lI; 0 is conservative. The plant of the idealised loop is ``T(s) = dp/(ds (s + dp))``: one coupled
-    pole at the frequency of the structure, a phase-neutral exciter and no delay.
+    The plant of the idealised loop is ``T(s) = dp/(ds (s + dp))``: one coupled pole at the frequency of the structure, a
+    phase-neutral exciter and no delay.
     """
     ds = plant.damping_ratio * plant.frequency_rad_s
     offset = plant.pole_offset_rad_s()
@@ -41,14 +39,12 @@ def hippold_gains(plant: PlantModel, low_pass_rad_s: float, *, imaginary_part: f
     if dp <= 0.0:
         raise ValueError(f"coupled pole = {offset:.4g} 1/s from the mode: allowed is one that decays")
     db = dp / low_pass_rad_s
-    real, square = -(1.0 + db) / 3.0, imaginary_part**2
+    real = -(1.0 + db) / 3.0
     law = PhaseLaw(
-        low_pass_rad_s * ds / dp * (3.0 * real**2 + square - db),
-        low_pass_rad_s**2 * ds / dp * -real * (real**2 + square),
+        low_pass_rad_s * ds / dp * (3.0 * real**2 - db),
+        low_pass_rad_s**2 * ds / dp * -real * real**2,
     )
-    w = low_pass_rad_s
-    poles = (complex(real * w), complex(real, imaginary_part) * w, complex(real, -imaginary_part) * w)
-    return HippoldGains(law, poles, _failed(plant, offset, low_pass_rad_s))
+    return HippoldGains(law, _failed(plant, offset, low_pass_rad_s))
 
 
 def _failed(plant: PlantModel, offset: complex, low_pass_rad_s: float) -> tuple[str, ...]:

@@ -1,6 +1,5 @@
 """The continuous backbone campaign: ramp the response level up and down without waiting, and evaluate every instant."""
 
-from itertools import product
 from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
@@ -9,7 +8,6 @@ from controller import AmplitudeLaw
 from rig.bench import Bench
 from rig.campaigns.planning.levels import ONE_LEVEL_KEY
 from rig.campaigns.planning.locked import LockedPlan
-from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
@@ -59,11 +57,6 @@ class ContinuousBackbonePlan(LockedPlan):
         if self.levels_m is None:
             raise InputError("a continuous backbone goes by the response", field=self.levels_key, allowed="levels_m")
         return self
-
-    def targets(self) -> tuple[Target, ...]:
-        """Return the levels of every repeat, rising."""
-        pairs = product(range(1, self.repeats + 1), sorted(self.levels))
-        return tuple(Target(number=n, level=level, repeat=repeat) for n, (repeat, level) in enumerate(pairs))
 
     def together(self, number: int) -> frozenset[int]:
         """Return the numbers of all levels of the same repeat."""

@@ -1,14 +1,12 @@
 """The decay campaign: settle at phase resonance, then take the output to 0 V at once and record how the vibration decays."""
 
 from dataclasses import replace
-from itertools import product
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from rig.bench import Bench
 from rig.campaigns.planning.locked import SettledPlan
-from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
@@ -46,11 +44,6 @@ class DecayPlan(SettledPlan):
     def evaluates_approach(self) -> bool:
         """The rows of a point begin with its ramp: settled record and decay are evaluated together."""
         return True
-
-    def targets(self) -> tuple[Target, ...]:
-        """Return all points in the order of measurement, the levels rising."""
-        pairs = product(range(1, self.repeats + 1), sorted(self.levels))
-        return tuple(Target(number=n, level=level, repeat=repeat) for n, (repeat, level) in enumerate(pairs))
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """Return the segments that measure all points except those in ``done``: each is approached from rest."""

@@ -1,6 +1,7 @@
 """Parts shared by all campaigns under a phase lock: known plant, checks and acceptance limits."""
 
 from dataclasses import replace
+from itertools import product
 from typing import Literal
 
 from pydantic import Field
@@ -11,7 +12,7 @@ from rig.bench import Bench
 from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.levels_on_plant import check_motion, check_voltage
-from rig.campaigns.planning.plan import Plan
+from rig.campaigns.planning.plan import Plan, Target
 from rig.campaigns.planning.plant import PlantFacts, check_quickness, check_stability, control_loops, lags_apart
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import SettleRule
@@ -43,6 +44,11 @@ class LockedPlan(Levels, Plan):
     def counts(self) -> dict[str, int]:
         """Numbers of levels and repeats."""
         return {**self.level_count, "repeats": self.repeats}
+
+    def targets(self) -> tuple[Target, ...]:
+        """Return the levels of every repeat, rising."""
+        pairs = product(range(1, self.repeats + 1), sorted(self.levels))
+        return tuple(Target(number=n, level=level, repeat=repeat) for n, (repeat, level) in enumerate(pairs))
 
     @property
     def law(self) -> PhaseLockedLoop:
