@@ -1,6 +1,6 @@
 """Harmonic balance of the rig of a subject, with errors of the simulators as errors of configuration."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -30,22 +30,31 @@ class Balance:
 
     def backbone(self, *, forces_n: Float | None = None, voltages_v: Float | None = None) -> PeriodicResponses:
         """Return the vibrations at phase resonance over levels of force or voltage."""
-        return self._found(phase_resonance_backbone, forces_n=forces_n, voltages_v=voltages_v)
+        with configuration_errors():
+            return phase_resonance_backbone(
+                self.subject.rig,
+                forces_n=forces_n,
+                voltages_v=voltages_v,
+                near_hz=self.subject.near_hz,
+                harmonics=self.harmonics,
+                samples=self.samples,
+            )
 
     def constant_force(self, force_n: float, lags_deg: Float) -> PeriodicResponses:
         """Return the vibrations at a force over phase lags."""
-        return self._found(constant_force_response, force_n, lags_deg)
+        rig, near_hz = self.subject.rig, self.subject.near_hz
+        with configuration_errors():
+            return constant_force_response(
+                rig, force_n, lags_deg, near_hz=near_hz, harmonics=self.harmonics, samples=self.samples
+            )
 
     def forced(self, voltage_v: float, grid_hz: Float) -> PeriodicResponses:
         """Return the vibrations at a voltage, followed in the order of the frequencies."""
-        return self._found(forced_response, voltage_v, grid_hz)
-
-    def _found(
-        self, balance: Callable[..., PeriodicResponses], *asked: float | Float, **levels: Float | None
-    ) -> PeriodicResponses:
         rig, near_hz = self.subject.rig, self.subject.near_hz
         with configuration_errors():
-            return balance(rig, *asked, **levels, near_hz=near_hz, harmonics=self.harmonics, samples=self.samples)
+            return forced_response(
+                rig, voltage_v, grid_hz, near_hz=near_hz, harmonics=self.harmonics, samples=self.samples
+            )
 
 
 @contextmanager
