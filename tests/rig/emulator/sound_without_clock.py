@@ -41,6 +41,9 @@ class Client:
     def set_process_callback(self, callback):
         self.callback = callback
 
+    def set_shutdown_callback(self, _callback):
+        """It never ends."""
+
     def set_xrun_callback(self, _callback):
         pass
 
