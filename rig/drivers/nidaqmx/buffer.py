@@ -10,6 +10,7 @@ time of the watchdog is stuck: the thread brings the output to 0 V by a raised c
 """
 
 import math
+import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -28,6 +29,8 @@ FULL_SCALE = 1 << 23
 """Counts of the largest output where outputs are continued: 24 bits, below the noise of any output."""
 HELD, CONTINUED = 1, 2
 """Bits of the flags of a block's outputs."""
+SWITCH_S = 2e-4
+"""Time after which a thread of Python lets another one run, s: 5 ms, as it is by itself, is a block of 64 at 12.8 kHz."""
 ENDING_S = 2.0
 """Longest wait beyond the ramp for the thread to end, s; chosen."""
 
@@ -111,6 +114,7 @@ class BufferThread:
             self._n_handed += 1
             self._changed.notify_all()
         if self._thread is None:
+            sys.setswitchinterval(SWITCH_S)
             self._thread = threading.Thread(target=self._run, name="nidaqmx buffer", daemon=True)
             self._thread.start()
 

@@ -12,6 +12,8 @@ LOWEST_HZ = DELTA_SIGMA_HZ / 4
 """Lowest sample rate of the bench, Hz: the filters of the inputs delay by 38.4 samples, 3 ms at this rate."""
 BLOCK = 64
 """Samples in a block, 5 ms at that rate: a block costs two calls of about 1 ms."""
+AHEAD = 3
+"""Blocks ahead in the output buffer by the clock: 15 ms at that rate, for calls of 1 ms that come through two processes."""
 OUTPUT = "cDAQ1Mod3/ao0"
 """Output that drives the rig."""
 
@@ -26,6 +28,7 @@ def chassis_options(bench: Bench, port: int, *, lockstep: bool) -> "Table":
         "coupling": ["DC" if channel.loopback else "AC" for channel in bench.channels],
         "excitation_ma": [0.0 if channel.loopback else 1e3 * NI_9234.iepe_a for channel in bench.channels],
         "lockstep": lockstep,
+        **({} if lockstep else {"buffer_blocks": AHEAD}),
     }
 
 

@@ -1,5 +1,6 @@
 """The emulated NI gRPC Device Server: it listens on this computer alone."""
 
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -26,6 +27,9 @@ HOST = "127.0.0.1"
 THREADS = 4
 """Threads that answer calls: one that waits for samples, one that writes them, and two to spare."""
 
+SWITCH_S = 2e-4
+"""Time after which a thread of Python lets another one run, s: 5 ms, as it is by itself, last as long as a block."""
+
 
 class DeviceServer:
     """A server with the virtual rig of a bench behind its devices; a context manager."""
@@ -49,6 +53,7 @@ class DeviceServer:
         """Port that it listens on, while it does."""
 
     def __enter__(self) -> Self:
+        sys.setswitchinterval(SWITCH_S)
         self._server = grpc.server(
             futures.ThreadPoolExecutor(THREADS, thread_name_prefix="call"), handlers=(self.calls,)
         )
