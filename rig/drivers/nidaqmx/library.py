@@ -63,6 +63,7 @@ ERRORS: dict[type[DaqError], dict[str, tuple[int, ...]]] = {
             -200010,  # INPUT_FIFO_OVERFLOW
             -200361,  # INPUT_FIFO_OVERFLOW_2
             -209829,  # INPUT_FIFO_OVERFLOW_3
+            -200714,  # ACQ_STOPPED_DRIVER_CANT_XFER_DATA_FAST_ENOUGH
         ),
         _UNDERFLOW: (
             -200290,  # GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES
@@ -134,13 +135,13 @@ ERRORS: dict[type[DaqError], dict[str, tuple[int, ...]]] = {
         _CLOCK: (
             -200284,  # SAMPLES_NOT_YET_AVAILABLE
             -200303,  # EXT_SAMP_CLK_SRC_NOT_SPECIFIED
-            -200292,  # SAMPLES_CAN_NOT_YET_BE_WRITTEN
             -201461,  # REFERENCE_CLOCK_NOT_PRESENT
             -201015,  # PLL_NOT_LOCKED
         ),
         _WAITED: (
             -200221,  # TIMEOUT_EXCEEDED
             -200474,  # OPERATION_TIMED_OUT
+            -200292,  # SAMPLES_CAN_NOT_YET_BE_WRITTEN
         ),
     },
     DaqWatchdog: {
@@ -157,6 +158,7 @@ ERRORS: dict[type[DaqError], dict[str, tuple[int, ...]]] = {
             -88709,  # RUNTIME_ABORTED_ROUTING
             -88710,  # RUNTIME_ABORTING_ROUTING
             -200088,  # INVALID_TASK
+            -200278,  # SAMPLES_WILL_NEVER_BE_AVAILABLE
         )
     },
 }

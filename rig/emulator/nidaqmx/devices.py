@@ -1,6 +1,7 @@
 """The devices of the emulated system: a CompactDAQ chassis with modules, and two multifunction devices that can share a clock.
 
-Facts are NI's public specifications: NI-9234 (377849B), NI-9263 (373781), cDAQ-9189 user manual, PXIe-6356 (374453).
+Facts are NI's public specifications: NI-9234 (377849B), NI-9263, cDAQ-9189 user manual, X Series user manual for the PXIe-6356
+(its table of analog input rates).
 """
 
 from dataclasses import dataclass
