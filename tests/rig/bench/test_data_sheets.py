@@ -148,7 +148,7 @@ def test_a_bench_may_start_from_one_with_sensors_in_another_folder(tmp_path):
         (
             '"A1",',
             '"A1", sensitivity_v_per_unit = 0.01,',
-            "channels[1].sensitivity_v_per_unit = 0.01: sensors.toml says",
+            "channels[1].sensitivity_v_per_unit = 0.01 V per N or m/s^2: sensors.toml says",
         ),
         (
             '"A1",',
