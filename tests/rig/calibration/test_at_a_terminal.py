@@ -1,8 +1,10 @@
 """`rig calibrate` with a person at the terminal, who is asked for the reading of a multimeter."""
 
 import os
+import signal
 import subprocess
 import sys
+import threading
 from contextlib import suppress
 from pathlib import Path
 
@@ -22,6 +24,8 @@ session.make_daq = Cables
 rig.cli.main()
 """
 """A process of the command with cables as its device."""
+PATIENCE_S = 300.0
+"""Time after which a command that waits for ever is ended, s."""
 
 
 def at_a_terminal(typed, folder):
@@ -37,9 +41,11 @@ def at_a_terminal(typed, folder):
         stderr=theirs,
         env=os.environ | path,
         start_new_session=True,
-        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # so that Ctrl-C is a signal
+        preexec_fn=_take_terminal,
     )
     os.close(theirs)
+    patience = threading.Timer(PATIENCE_S, process.kill)
+    patience.start()
     said = b""
     with suppress(OSError):  # the terminal is closed by its last process
         while part := os.read(ours, 4096):
@@ -48,7 +54,15 @@ def at_a_terminal(typed, folder):
                 os.write(ours, typed.pop(0))
                 said += b" "
     os.close(ours)
-    return said.decode(), process.wait()
+    status = process.wait()
+    patience.cancel()
+    return said.decode(), status
+
+
+def _take_terminal():
+    """So that Ctrl-C is a signal, also where the tests run in the background, in which it is ignored."""
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_a_person_at_the_terminal_is_asked_for_the_reading(tmp_path):
