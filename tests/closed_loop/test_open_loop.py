@@ -201,7 +201,7 @@ def test_a_multisine_that_is_not_settled_is_not_accepted():
     [
         ({"resolution_hz": 0.3}, "resolution_hz"),
         ({"highest_hz": 4000.0}, "`?highest_hz`? = 4000"),
-        ({"levels_rms_v": (3.0,)}, r"`?levels_rms_v\[0\]`? = 3 V: peaks reach"),
+        ({"levels_rms_v": (3.0,)}, r"`?levels_rms_v\[0\]`? = 3 V RMS: peaks reach"),
         ({"lowest_hz": 25.1, "highest_hz": 25.2}, "no line"),
         ({"resolution_hz": 0.001, "realisations": 21}, "`?realisations`? = 21; allowed: up to 20 "),
         ({"resolution_hz": 1e5}, "`?resolution_hz`? = 100000 Hz"),
@@ -219,8 +219,8 @@ def test_a_multisine_that_the_bench_cannot_play_is_refused(changes, fault):
         ({"rate_hz_per_s": None}, "exactly one"),
         ({"stop_hz": 22.0}, "anything but start_hz"),
         ({"rate_hz_per_s": -1.0}, "rate_hz_per_s"),
-        ({"rate_hz_per_s": 1e-300}, "rate_hz_per_s`? = 1e-300; allowed: from 5.787e-05, a sweep of a day"),
-        ({"rate_hz_per_s": 1e4}, "`?rate_hz_per_s`? = 10000; allowed: up to 12.25 "),
+        ({"rate_hz_per_s": 1e-300}, "rate_hz_per_s`? = 1e-300 Hz/s; allowed: from 5.787e-05, a sweep of a day"),
+        ({"rate_hz_per_s": 1e4}, "`?rate_hz_per_s`? = 10000 Hz/s; allowed: up to 12.25 "),
         ({"off_resonance_hz": ()}, "off_resonance_hz"),
     ],
 )
@@ -278,7 +278,7 @@ def test_an_interrupted_realisation_is_shown_as_failed_without_empty_columns(cap
 
 
 def test_a_level_of_a_multisine_stands_in_its_plan_once():
-    with pytest.raises(ValueError, match=r"levels_rms_v\[1\]`? = 0.05(?: \S+)?; allowed: each level once"):
+    with pytest.raises(ValueError, match=r"levels_rms_v\[1\]`? = 0.05 V RMS; allowed: each level once"):
         MultisinePlan.model_validate(MULTISINE.model_dump() | {"levels_rms_v": (0.05, 0.05)})
 
 

@@ -153,7 +153,7 @@ def test_droop_and_stiff_suspension_make_no_power() -> None:
             {"amplifier": "current", "voltage_limit_v": 10.0},
             r"voltage_limit_v`? = 10(?: \S+)?; allowed: current_limit_a",
         ),
-        ({"current_limit_a": 10.0}, "current_limit_a`? = 10; allowed: voltage_limit_v"),
+        ({"current_limit_a": 10.0}, "current_limit_a`? = 10 A; allowed: voltage_limit_v"),
         ({"amplifier": "charge"}, "'voltage' or 'current'"),
         ({"amplifier_gain": 0.0}, "greater than 0"),
         ({"suspension_cubic_n_m3": -1.0}, "greater than or equal to 0"),

@@ -247,7 +247,7 @@ def test_site_force_has_no_slope_at_rest_but_what_was_declared(element: Element)
         ({"function": pushing_at_rest}, "gives 1 N at rest; allowed: 0"),
         ({"function": undefined_at_rest}, "gives nan at 0; allowed: a finite force"),
         ({"function": NAME, "parameters": [1.0] * 9}, "at most 8 items"),
-        ({"function": drag, "of": "velocity", "linear_n_m": 1.0}, "linear_n_m`? = 1; allowed: 0"),
+        ({"function": drag, "of": "velocity", "linear_n_m": 1.0}, "linear_n_m`? = 1 N/m; allowed: 0"),
     ],
 )
 def test_a_users_function_that_cannot_work_is_refused(element: dict[str, Any], message: str) -> None:
