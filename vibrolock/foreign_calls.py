@@ -1,11 +1,9 @@
-"""For kernels that the code of others calls, in a thread of its own and without Python: shared arrays, a fence, a clock.
+"""For kernels that the code of others calls, in a thread of its own and without Python: arrays in shared memory, and a fence.
 
 Importing this module loads numba.
 """
 
 import ctypes
-import os
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -43,23 +41,6 @@ def _pointer(_: Any, address: Any) -> Any:
 
 fence: Any = intrinsic(_fence)
 pointer: Any = intrinsic(_pointer)
-
-
-def _clock() -> Any:
-    """Return C's ``clock_gettime``; on Windows, which has none, a function that leaves the time as it is."""
-    if os.name == "nt":
-        return numba.njit(types.int32(types.int32, types.voidptr))(lambda _kind, _instant: -1)
-    read = ctypes.CDLL(None).clock_gettime
-    read.argtypes, read.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_int
-    return read
-
-
-read_clock: Any = _clock()
-"""``read_clock(MONOTONIC, pointer)`` in a kernel: seconds and nanoseconds, int64[2] at the pointer."""
-HAS_CLOCK = os.name != "nt"
-"""Whether `read_clock` reads one."""
-MONOTONIC = getattr(time, "CLOCK_MONOTONIC", 1)
-"""Number of the monotonic clock in C."""
 
 
 def compiled_for_c(function: Callable[..., Any], result: Any, *arguments: Any) -> Any:

@@ -23,7 +23,6 @@ import scipy
 
 from rig.bench import Arming, Bench, DriverChoice
 from rig.bench.channels import Channel
-from rig.drivers.sound.lost_time import CLOCK, lost_frames
 from rig.emulator.plant import OutputLog, VirtualPlant, Wiring
 from rig.errors import ConfigurationError, DaqError, DaqRefused
 from vibrolock.arrays import Float
@@ -89,12 +88,9 @@ class Card:
         self._of_output = HighPasses(corners_hz[:1], client.samplerate)
         self._of_inputs = HighPasses(corners_hz[1:], client.samplerate)
         self._cables = cables
-        self.counts = {"periods": 0, "interruptions": 0, "lost_frames": 0, "overloads": 0}
+        self.counts = {"periods": 0, "interruptions": 0, "overloads": 0}
         self.failure: Exception | None = None
         self._client, self._plant = client, plant
-        self._clock, self._frame, self._seen = np.zeros(1, CLOCK)[0], 0, 0
-        self._clock["rate_hz"] = plant.rate_hz
-        lost_frames(np.zeros(1, CLOCK)[0], 0.0, 0, 1, False)  # compiles
         self._drive = client.inports.register("output_1")
         self._sensors = [
             client.outports.register(f"input_{index + 1}_{name}") for index, name in enumerate(plant.names)
@@ -106,7 +102,6 @@ class Card:
 
     def _period(self, frames: int) -> None:
         try:
-            self._pass_lost_time(frames)
             readings, flags = self._read(self._plant.output_range_v * np.array(self._drive.get_array(), float))
             for port, reading in zip(self._sensors, readings.T, strict=True):
                 port.get_array()[:] = reading
@@ -126,14 +121,6 @@ class Card:
             readings[:], flags = readings[:, -1:], 0
         self._of_inputs(readings)
         return readings, flags
-
-    def _pass_lost_time(self, frames: int) -> None:
-        interrupted, self._seen = self.counts["interruptions"] > self._seen, self.counts["interruptions"]
-        lost = max(0, lost_frames(self._clock, time.monotonic(), self._frame, frames, interrupted))
-        if lost:
-            self._read(np.zeros(lost))
-            self.counts["lost_frames"] += lost
-        self._frame += lost + frames
 
     def _server_ended(self, _status: object, reason: str) -> None:
         self.failure = DaqError(f"the JACK server has ended ({reason})")

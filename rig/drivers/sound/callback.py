@@ -16,17 +16,7 @@ import numpy as np
 from rig.continuation import SOURCE, begin, count_at, forget, keep, ring_for
 from rig.drivers.sound.lost_time import CLOCK, IN_DOUBT, lost_frames
 from vibrolock.compiled import Record, kernel
-from vibrolock.foreign_calls import (
-    INT,
-    MONOTONIC,
-    POINTER,
-    UNSIGNED_LONG,
-    array_at,
-    compiled_for_c,
-    fence,
-    pointer,
-    read_clock,
-)
+from vibrolock.foreign_calls import INT, POINTER, UNSIGNED_LONG, array_at, compiled_for_c, fence, pointer
 
 FULL_SCALE = 1 << 23
 """Counts of full scale: a converter of 24 bits."""
@@ -55,8 +45,8 @@ _COUNTS = (
     "interruptions",
     "lost",
 )
-_FADE = ("held", "fade_at", "fade_length", "watchdog", "tripped", "by_system_clock")
-_ADDRESSES = ("of_messages", "of_sent", "of_source", "of_history", "of_outputs", "of_due", "of_clock", "of_instant")
+_FADE = ("held", "fade_at", "fade_length", "watchdog", "tripped", "is_gapless")
+_ADDRESSES = ("of_messages", "of_sent", "of_source", "of_history", "of_outputs", "of_due", "of_clock")
 _RINGS = ("of_inputs", "of_flags", "of_put_out")
 _SIZES = ("inputs", "outputs_channels", "output", "sent_size", "history_size", "outputs_size", "ring_size")
 STATE = np.dtype([(name, "i8") for name in (*_COUNTS, *_FADE, *_ADDRESSES, *_RINGS, *_SIZES)] + [("latency_s", "f8")])
@@ -67,8 +57,8 @@ By the driver: ``written`` messages so far; ``begin``: how often a beginning was
 ``read`` messages; ``begun``: beginnings made; ``origin``: frame of the first sample, -1 before; ``first`` and ``put``:
 frames at which the first output is due and up to which outputs have come; ``frame``: the frame under way; ``done``: frames
 that are over and may be read; ``calls``, ``interruptions`` and ``lost`` frames; ``held``: the last count; ``fade_at``:
-frame at which a fade begins, -1 without one; ``tripped``: 1 after the watchdog; ``by_system_clock``: by the driver, 1 where
-lost frames are told by the system's clock, since time stamps are not;
+frame at which a fade begins, -1 without one; ``tripped``: 1 after the watchdog; ``is_gapless``: by the driver, 1 where time
+stamps do not tell what was lost, as over JACK;
 ``latency_s``: output time less input time by the stream's own time stamps. The rest are addresses and lengths of the arrays
 of `Memory`."""
 
@@ -92,7 +82,6 @@ class Memory:
         self.outputs = np.zeros(ahead, np.int64)
         self.due = np.full(ahead, -1, np.int64)
         self.clock = np.zeros(1, CLOCK)
-        self.instant = np.zeros(2, np.int64)
         self.inputs = np.zeros((behind, inputs), np.float32)
         self.flags = np.zeros(behind, np.int64)
         self.put_out = np.zeros(behind, np.int64)
@@ -213,19 +202,19 @@ def _period(
     written: np.ndarray,
     clock: Record,
     times: np.ndarray,
-    now_s: float,
     status: int,
 ) -> None:
     """Exchange one period: ``read`` float32[frames, inputs] comes in, ``written`` float32[frames, outputs] goes out.
 
-    ``times``: PortAudio's time stamps of the first frame, s: into the input converter, now, out of the output converter;
-    ``now_s``: the system's clock.
+    ``times``: PortAudio's time stamps of the first frame, s: into the input converter, now, out of the output converter.
     """
     frames = read.shape[0]
     state.calls += 1
     interrupted = status & INTERRUPTED != 0 and state.calls > 1
     state.interruptions += interrupted
-    lost = lost_frames(clock, now_s if state.by_system_clock else times[0], state.frame, frames, interrupted)
+    lost = IN_DOUBT if interrupted else 0
+    if not state.is_gapless:
+        lost = lost_frames(clock, times[0], state.frame, frames, interrupted)
     if lost > 0:
         _skip(state, inputs, flags, min(lost, flags.size))
     state.latency_s = times[2] - times[0]
@@ -261,9 +250,6 @@ def _callback(
     read: Any, written: Any, frames: int, times: Any, status: int, memory: Any
 ) -> int:  # pragma: no cover (machine code)
     state = array_at(memory, 1, STATE)[0]
-    instant = pointer(state.of_instant)
-    read_clock(MONOTONIC, instant)
-    now = array_at(instant, 2, np.int64)
     _period(
         state,
         array_at(pointer(state.of_source), 1, SOURCE)[0],
@@ -279,7 +265,6 @@ def _callback(
         array_at(written, (frames, state.outputs_channels), np.float32),
         array_at(pointer(state.of_clock), 1, CLOCK)[0],
         array_at(times, 3, np.float64),
-        now[0] + 1e-9 * now[1],
         status,
     )
     return 0

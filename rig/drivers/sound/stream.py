@@ -11,7 +11,6 @@ from rig.drivers.sound.callback import FULL_SCALE, MESSAGES, Memory, compiled_ca
 from rig.drivers.sound.devices import SoundDevice, abandon, as_sound_error, library, release
 from rig.errors import DaqDisconnected, DaqError, DaqOverrun, DaqTimeout, DaqWatchdog
 from vibrolock.arrays import Float, Int
-from vibrolock.foreign_calls import HAS_CLOCK
 
 SHORTEST_SLEEP_S = 1e-4
 """Shortest sleep while frames are awaited, s; chosen: far below a period."""
@@ -68,8 +67,7 @@ class DuplexStream:
         )
         self._record = self.memory.record
         self.memory.clock["rate_hz"], self._record["watchdog"] = setting.rate_hz, watchdog
-        # JACK's time stamps take seconds to follow time that was lost
-        self._record["by_system_clock"] = HAS_CLOCK and setting.device.host_api.startswith("JACK")
+        self._record["is_gapless"] = setting.device.host_api.startswith("JACK")
         self._record["fade_length"] = max(1, fade)
         self._audio = audio = library()
         self._sent = self._place = self._taken = 0
