@@ -2,6 +2,7 @@
 
 import gc
 import os
+import uuid
 
 # One thread for linear algebra, before numpy is imported. The matrices of the tests are small: on a busy machine threads that
 # wait for each other make an identification ten times slower.
@@ -64,6 +65,12 @@ def runs_of_the_tests_alone(tmp_path_factory):
     os.environ.pop("VIBROLOCK_LIVE")
     if before is not None:
         os.environ["VIBROLOCK_LIVE"] = before
+
+
+@pytest.fixture(autouse=True)
+def benches_that_no_test_has_run(monkeypatch, tmp_path_factory):
+    """What is remembered of benches, their trips above all, is a test's own, and nothing is kept in the user's folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.getbasetemp() / "state" / uuid.uuid4().hex))
 
 
 @pytest.fixture(autouse=True)

@@ -138,6 +138,11 @@ class BufferThread:
         """Whether the thread has ended."""
         return self._failure is not None
 
+    @property
+    def is_ending(self) -> bool:
+        """Whether the output is being brought to 0 V, or is there."""
+        return self._is_ending
+
     def end(self) -> None:
         """Bring the output to 0 V, and end the thread."""
         thread, self._thread = self._thread, None

@@ -57,18 +57,13 @@ class Loop:
 
     def end(self):
         """End the thread while the device goes on to sample."""
-        ended = threading.Event()
-        self.chassis.is_over = lambda: self.thread.is_over or ended.is_set()
-
-        def sample():
-            while not (self.chassis.is_over() or self.chassis.faults):
-                self.chassis.sample()
-
-        sampling = threading.Thread(target=sample)
-        sampling.start()
-        self.thread.end()
-        ended.set()
-        sampling.join()
+        ending = threading.Thread(target=self.thread.end)
+        ending.start()
+        while ending.is_alive() and not self.thread.is_ending:
+            ending.join(0.001)
+        while ending.is_alive() and not (self.thread.is_over or self.chassis.faults):
+            self.chassis.sample()
+        ending.join()
 
     def volts(self, instants):
         sine = AMPLITUDE_V * np.sin(2.0 * np.pi * np.asarray(instants) / PERIOD)

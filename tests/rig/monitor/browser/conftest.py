@@ -62,12 +62,11 @@ class Browser:
         self.until(lambda: self.driver.find_elements("id", "stop"), "the page")
 
     def until(self, condition, what="what was expected"):
-        from selenium.common.exceptions import StaleElementReferenceException, TimeoutException
+        from selenium.common.exceptions import TimeoutException, WebDriverException
         from selenium.webdriver.support.wait import WebDriverWait
 
-        wait = WebDriverWait(
-            self.driver, LONG_S, poll_frequency=0.02, ignored_exceptions=[StaleElementReferenceException]
-        )
+        # Where a page is replaced while it is read, Chromium answers with errors of many kinds.
+        wait = WebDriverWait(self.driver, LONG_S, poll_frequency=0.02, ignored_exceptions=[WebDriverException])
         try:
             return wait.until(lambda _: condition())
         except TimeoutException:
@@ -107,21 +106,27 @@ class Browser:
     def before_the_page(self, script):
         """Run a script in every page before its own."""
         made = self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": script})
-        yield
-        self.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", made)
+        try:
+            yield
+        finally:
+            self.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", made)
 
     @contextmanager
     def without_scripts(self):
         self.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
-        yield
-        self.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+        try:
+            yield
+        finally:
+            self.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
 
     @contextmanager
     def of_size(self, width, height):
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        yield
-        self.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        try:
+            yield
+        finally:
+            self.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 @pytest.fixture

@@ -88,7 +88,8 @@ def test_stop_works_where_scripts_are_off(browser, serve, told):
     with browser.without_scripts():
         browser.driver.get(server.url)
         browser.until(lambda: browser.driver.find_elements("id", "stop"), "the page")
-        assert "STOP works" in browser.driver.find_element("css selector", ".noscript").text
+        note = lambda: browser.driver.find_element("css selector", ".noscript").text  # noqa: E731
+        browser.until(lambda: "STOP works" in note(), "a note that STOP works")
         click(browser)
         heading = lambda: browser.driver.find_element("tag name", "h1").text  # noqa: E731
         browser.until(lambda: "RAMPING DOWN" in heading(), "the server's own page")
