@@ -4,14 +4,17 @@ import math
 
 import numpy as np
 
-from controller.kernels import track
+from controller.kernels import TWO_PI, track
 from rig.tick.layout import SENSOR_AT_RANGE, TickArrays
-from rig.tick.safety.kernels import check_gap, extrapolate_motion, watch_input, watch_motion
+from rig.tick.safety.kernels import check_gap, correct_motion, extrapolate_motion, watch_input, watch_motion
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive
 from vibrolock.compiled import kernel
 
 STUCK_SAMPLES = 16  # equal readings in a row; more than occur at a turning point of any vibration worth watching
+
+UNCERTAIN_PERIODS = 1.5
+"""Periods after a loss in which the displacement is corrected; chosen: a difference has then fallen to 0.1 %."""
 
 
 @kernel
@@ -38,6 +41,7 @@ def read_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
     driven = armed and (loop.held == 1 or t.progress[0].start_level > 0.0)  # in a ramp from a level, too
     # Start with the mean of all samples so far: noise or ambient vibration in one sample would be integrated to displacement.
     mean_gain = max(t.law[0].detector.mean_gain, 1.0 / (loop.seen + 1.0))
+    corrected = loop.uncertain > 0 and mean_gain == t.law[0].detector.mean_gain
     loop.seen += 1
     flags = 0
     force = 0.0
@@ -65,9 +69,19 @@ def read_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
         if index == loop.drive_channel:
             drive = value
         if channel.watch_displacement == 1 and moves:
+            if corrected:
+                correct_motion(limits, watch, value, dominant_omega(t), mean_gain)
             watch_motion(guard, limits, watch, value, index, loop.sample)
+    loop.uncertain = max(loop.uncertain - 1, 0)
     loop.force, loop.drive_motion = force, drive
     return flags
+
+
+@kernel
+def dominant_omega(t: TickArrays) -> float:
+    """Return the frequency (rad/s) at which the structure mainly vibrates: the oscillator's, or the resonance in a waveform."""
+    waveform = t.loop[0].drive == Drive.WAVEFORM
+    return float(t.limits[0].resonance_rad_s if waveform else t.control[0].frequency.omega)
 
 
 @kernel
@@ -81,7 +95,8 @@ def bridge_lost_sample(t: TickArrays, readings: np.ndarray, cos_theta: float, si
     dt, mean_gain = loop.dt_s, t.law[0].detector.mean_gain
     readings[:] = math.nan
     loop.lost += 1
-    omega = limits.resonance_rad_s if loop.drive == Drive.WAVEFORM else t.control[0].frequency.omega
+    omega = dominant_omega(t)
+    loop.uncertain = round(UNCERTAIN_PERIODS * TWO_PI / (omega * dt))
     cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
     for index in range(t.inputs.size):
         if t.inputs[index].watch_displacement == 1:

@@ -110,6 +110,25 @@ def extrapolate_motion(limits: Record, watch: Record, cos_step: float, sin_step:
 
 
 @kernel
+def correct_motion(limits: Record, watch: Record, acceleration: float, omega: float, mean_gain: float) -> None:
+    """Draw velocity and displacement towards the harmonic vibration at ``omega`` (rad/s) that an acceleration (m/s^2) shows.
+
+    After a loss the vibration may go on with another phase than was extrapolated: the device has put out something else, or
+    has lost more than it said. Integration alone would keep the difference of velocity for seconds, for the leak is small. A
+    Luenberger observer forgets it within a period. It compares the acceleration with that of `extrapolate_motion`, and its
+    poles are ``-w (1 +- j) / sqrt(2)``. A harmonic vibration at ``w`` is left as it is. The channel's mean follows a vibration
+    by ``mean_gain / dt`` times its velocity.
+    """
+    dt = limits.integrator_gain
+    leak = limits.integrator_leak / dt
+    expected = 2.0 * leak * watch.velocity - (omega * omega + leak * leak) * watch.displacement
+    step = dt * (expected - acceleration)
+    watch.velocity += step
+    watch.displacement += math.sqrt(2.0) / omega * step
+    watch.mean += mean_gain / dt * step
+
+
+@kernel
 def check_gap(guard: Record, limits: Record, lost: int, sample: int, dt_s: float) -> None:
     """Trip if the count of lost samples, minus those received since, reaches its limit."""
     if lost >= limits.lost_samples:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from controller import AmplitudeLaw, preset
-from rig.tick.measure import bridge_lost_sample
+from rig.tick.measure import bridge_lost_sample, read_inputs
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick, TickSettings
@@ -55,3 +55,31 @@ def test_the_mean_of_the_force_goes_on_as_if_its_samples_had_come(tick):
         seen += gain * (0.5 + force - seen)
     assert means[channel] == pytest.approx(0.5 + gain * forces.sum(), rel=1e-12)
     assert means[channel] - 0.5 == pytest.approx(seen - 0.5, rel=60 * gain)
+
+
+@pytest.mark.parametrize("jump_deg", [-40.0, -25.0, 0.0, 25.0, 40.0, 180.0])
+@pytest.mark.parametrize("at_deg", [0.0, 45.0, 90.0, 135.0])
+@pytest.mark.parametrize("lost", [1, 60])
+def test_a_vibration_that_goes_on_with_another_phase_after_a_loss_feigns_no_displacement(tick, lost, at_deg, jump_deg):
+    """A harmonic vibration of 1 mm; integrated alone, a jump by 40 degrees would show 4 mm, and for tenths of a second."""
+    arrays, size_m, first = tick.arrays, 1e-3, 30_000
+    loop, omega = arrays.loop[0], float(arrays.control["frequency"]["omega"][0])
+    channel = int(loop["drive_channel"])
+    step_rad = omega * loop["dt_s"]
+    period = round(2.0 * math.pi / step_rad)
+    per_m = -(omega**2) / arrays.inputs["unit_per_volt"][channel]
+    volts, readings = np.zeros(len(arrays.inputs)), np.zeros(len(arrays.inputs))
+    seen = []
+    for sample in range(first + lost + 40 * period):
+        angle_rad = step_rad * (sample - first) + math.radians(at_deg)
+        if first <= sample < first + lost:
+            bridge_lost_sample(arrays, readings, 1.0, 0.0)
+        else:
+            jump_rad = math.radians(jump_deg) if sample >= first else 0.0
+            volts[channel] = size_m * per_m * math.cos(angle_rad + jump_rad)
+            read_inputs(arrays, volts, readings)
+        seen.append(arrays.watches["displacement"][channel])
+    sizes = np.abs(seen[first - period :]) / size_m
+    assert sizes[:period].max() == pytest.approx(1.0, rel=0.02)
+    assert sizes[period:].max() < (1.2 if abs(jump_deg) < 90.0 else 1.4)
+    assert sizes[-period:].max() == pytest.approx(1.0, rel=0.1)
