@@ -17,6 +17,8 @@ STEPS = 1 << 16
 """Steps of a period in one sample."""
 SHORTEST_PERIOD = 4
 """Samples: a cubic through four outputs says nothing of a shorter period."""
+LOWEST_CONTINUED_HZ = 2.0
+"""Lowest frequency of which a period is continued, Hz; chosen: below the first mode of what is tested."""
 _REACH = 4  # outputs that are read beside a period: the points of the cubic
 _UNIT = 1 << 30  # of the factor of a ramp
 _NO_RUN = -1  # no block ends there
@@ -38,6 +40,11 @@ SOURCE = np.dtype(
 """What a device goes on with (one record). ``longest``: longest period, samples; ``armed``: instant of ARM; ``run_begin``,
 ``run_end``: consecutive outputs with a period. The source is the period before ``end``: ``period`` (steps; 0: there is no
 source, outputs are held), ``ramp`` (samples from ``end`` to 0 V; 0: none), and its extremes, valid where ``is_bounded``."""
+
+
+def longest_period(rate_hz: float) -> int:
+    """Return the longest period that is continued at a rate (Hz), samples."""
+    return math.ceil(rate_hz / LOWEST_CONTINUED_HZ)
 
 
 def ring_for(longest_period: int) -> np.ndarray:

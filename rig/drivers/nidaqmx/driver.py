@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
-from rig.continuation import period_steps, ramp_length
+from rig.continuation import longest_period, period_steps, ramp_length
 from rig.daq import CONTINUED as OUTPUT_CONTINUED, DAQ, HELD as OUTPUT_HELD, Adjustable, Capabilities
 from rig.drivers.nidaqmx.buffer import HELD, BufferThread, Plan
 from rig.drivers.nidaqmx.devices import NiDevice, devices_of
@@ -15,8 +15,8 @@ from rig.drivers.nidaqmx.library import Session
 from rig.drivers.nidaqmx.options import NiDaqmxOptions
 from rig.drivers.nidaqmx.tasks import SAME_RATE, Facts, Setting, Tasks, put_zero
 from rig.drivers.nidaqmx.watchdog import DeviceWatchdog
-from rig.drivers.wire.options import LARGEST_QUEUE, watchdog_range_s, watchdog_s
-from rig.errors import DaqDisconnected, DaqMismatch, DaqRefused
+from rig.drivers.wire.options import LARGEST_QUEUE, check_inputs, watchdog_range_s, watchdog_s
+from rig.errors import DaqDisconnected, DaqMismatch
 
 LARGEST_BLOCK = 65536
 """Largest block, samples; chosen: more than a bench may have."""
@@ -25,8 +25,6 @@ BUFFER_S, BUFFER_BLOCKS = 0.01, 2
 Python may keep a thread waiting."""
 TIMEOUT_S, TIMEOUT_BLOCKS = 0.5, 10
 """Default wait for a block, s and blocks, the longer of the two."""
-LOWEST_CONTINUED_HZ = 2.0
-"""Lowest frequency of which a period is continued, Hz; chosen: below the first mode of what is tested."""
 HOLD_SAMPLES = 0.5
 """A held output is half a sample late on average."""
 SMALLEST_SKEW = 0.01
@@ -50,13 +48,7 @@ class NiDaqmxDAQ(DAQ):
         self._bench = bench
         self._given = self._options = validated(NiDaqmxOptions, bench.driver.options, "driver.options")
         inputs = self._options.inputs
-        if len(inputs) != len(bench.channels):
-            raise DaqRefused(
-                f"{len(inputs)} channels of the device for {len(bench.channels)} of the bench",
-                field="driver.options.inputs",
-                value=list(inputs),
-                allowed="one for each channel of the bench, in their order",
-            )
+        check_inputs(inputs, bench)
         self._session: Session | None = None
         self._devices: list[NiDevice] = []
         self._facts: Facts | None = None
@@ -150,7 +142,7 @@ class NiDaqmxDAQ(DAQ):
             wire_share={self._bench.block: 0.0},
             largest_wire_share=1.0,
             automatic=self._given.queue_blocks == "auto",
-            longest_period=0 if self._options.lockstep else self._longest_period,
+            longest_period=0 if self._options.lockstep else longest_period(self.sample_rate_hz),
             buffered_blocks=self._ahead(self._bench.block),
         )
 
@@ -168,11 +160,6 @@ class NiDaqmxDAQ(DAQ):
     def _watchdog_s(self) -> float:
         block_s = self._bench.block / self.sample_rate_hz
         return watchdog_s(self._options, 0.0, block_s, moves=not self.capabilities.virtual)
-
-    @property
-    def _longest_period(self) -> int:
-        """Longest period that is continued, samples."""
-        return math.ceil(self.sample_rate_hz / LOWEST_CONTINUED_HZ)
 
     # What it does
 
@@ -285,7 +272,7 @@ class NiDaqmxDAQ(DAQ):
             queue=options.queue + ahead,
             watchdog=round(self._watchdog_s * rate_hz),
             ramp=round(options.ramp_s * rate_hz),
-            longest_period=self._longest_period,
+            longest_period=longest_period(self.sample_rate_hz),
             output_range_v=self.output_range_v,
             timeout_s=self._timeout_s(self.block),
             rate_hz=rate_hz,

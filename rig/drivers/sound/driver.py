@@ -6,7 +6,7 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
-from rig.continuation import period_steps, ramp_length
+from rig.continuation import longest_period, period_steps, ramp_length
 from rig.daq import CONTINUED as OUTPUT_CONTINUED, DAQ, HELD as OUTPUT_HELD, LOST, Adjustable, Capabilities
 from rig.drivers.sound.callback import CONTINUED, FULL_SCALE, HELD, LOST_FRAME, OVERLOAD
 from rig.drivers.sound.devices import SoundDevice, found, supported_rates
@@ -14,7 +14,7 @@ from rig.drivers.sound.loopback import FRAMES, measured_delay
 from rig.drivers.sound.options import SoundOptions
 from rig.drivers.sound.rates import PASS_BAND, Decimator, Interpolator, chosen_rate, factor_of, low_pass
 from rig.drivers.sound.stream import DuplexStream, Setting, counts_of
-from rig.drivers.wire.options import LARGEST_QUEUE, watchdog_range_s, watchdog_s
+from rig.drivers.wire.options import LARGEST_QUEUE, check_inputs, watchdog_range_s, watchdog_s
 from rig.errors import DaqMismatch, DaqRefused
 from vibrolock.arrays import Float
 
@@ -22,8 +22,6 @@ LARGEST_BLOCK = 65536
 """Largest block, samples; chosen: more than a bench may have."""
 TIMEOUT_S, TIMEOUT_BLOCKS = 0.5, 10
 """Default wait for frames, s and blocks, the longer of the two."""
-LOWEST_CONTINUED_HZ = 2.0
-"""Lowest frequency of which a period is continued, Hz; chosen: below the first mode of what is tested."""
 TEST_SIGNAL = 0.01
 """Amplitude of the loopback's test signal, of the bench's largest output."""
 FLAGS = {OUTPUT_HELD: HELD, OUTPUT_CONTINUED: CONTINUED, "overload": OVERLOAD}
@@ -46,13 +44,7 @@ class SoundDAQ(DAQ):
         self._bench = bench
         self._given = self._options = validated(SoundOptions, bench.driver.options, "driver.options")
         inputs = self._options.inputs or tuple(range(1, len(bench.channels) + 1))
-        if len(inputs) != len(bench.channels):
-            raise DaqRefused(
-                f"{len(inputs)} channels of the device for {len(bench.channels)} of the bench",
-                field="driver.options.inputs",
-                value=list(inputs),
-                allowed="one for each channel of the bench, in their order",
-            )
+        check_inputs(inputs, bench)
         self._inputs = inputs
         self._device: SoundDevice | None = None
         self._rate_hz, self._factor = bench.sample_rate_hz, 1
@@ -117,7 +109,7 @@ class SoundDAQ(DAQ):
             "latency_from": "time stamps"
             if self._loopback is None
             else f"loopback channel {self.channels[self._loopback].name}",
-            "longest_period": f"{self._longest_period // self._factor}",
+            "longest_period": f"{longest_period(self._rate_hz) // self._factor}",
         }
 
     @property
@@ -149,7 +141,7 @@ class SoundDAQ(DAQ):
             wire_share={self._bench.block: 0.0},
             largest_wire_share=1.0,
             automatic=self._given.queue_blocks == "auto",
-            longest_period=self._longest_period // self._factor,
+            longest_period=longest_period(self._rate_hz) // self._factor,
         )
 
     def adjust(self, queue_blocks: int, watchdog_s: float | None = None) -> None:
@@ -165,11 +157,6 @@ class SoundDAQ(DAQ):
     @property
     def _watchdog_s(self) -> float:
         return watchdog_s(self._options, 0.0, self._bench.block / self.sample_rate_hz, moves=True)
-
-    @property
-    def _longest_period(self) -> int:
-        """Longest period that is continued, frames."""
-        return math.ceil(self._rate_hz / LOWEST_CONTINUED_HZ)
 
     # What it does
 
@@ -265,7 +252,7 @@ class SoundDAQ(DAQ):
             setting,
             block=block,
             ahead=max(self._queue + 8, math.ceil((FRAMES + 8 * options.period_frames) / block) + 1),
-            longest_period=self._longest_period,
+            longest_period=longest_period(self._rate_hz),
             watchdog=round(self._watchdog_s * self._rate_hz),
             fade=round(options.ramp_s * self._rate_hz),
         )

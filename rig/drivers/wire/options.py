@@ -1,10 +1,12 @@
 """Options that all wires share, and the watchdog time that follows from them."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field_validator
 from pydantic_core import PydanticCustomError
 
+from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.drivers.wire.facts import DeviceFacts
 from rig.errors import DaqRefused
@@ -41,6 +43,17 @@ class WireOptions(Configured):
     def queue(self) -> int:
         """Number of blocks; 1 until ``"auto"`` was replaced by a number (`rig.daq.DAQ.adjust`)."""
         return 1 if self.queue_blocks == "auto" else self.queue_blocks
+
+
+def check_inputs(inputs: Sequence[int | str], bench: Bench) -> None:
+    """Raise `DaqRefused` unless there is one input of the device for each channel of a bench."""
+    if len(inputs) != len(bench.channels):
+        raise DaqRefused(
+            f"{len(inputs)} channels of the device for {len(bench.channels)} of the bench",
+            field="driver.options.inputs",
+            value=list(inputs),
+            allowed="one for each channel of the bench, in their order",
+        )
 
 
 DEFAULT_S, DEFAULT_BLOCKS = 0.1, 4  # default watchdog, s and blocks, the longer of the two; chosen
