@@ -10,6 +10,10 @@ from identification.mapping.sampling import SignalMapping
 from vibrolock.errors import InputError
 
 Axis = Literal["sample", "channel", "period", "realisation", "level"]
+Encoding = Literal[
+    "utf-8", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1250", "cp1251", "cp1252", "cp437", "cp850", "mac-roman",
+    "shift-jis", "gb18030", "euc-kr"
+]  # fmt: skip
 Count = Annotated[int, Field(ge=0)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -18,13 +22,17 @@ class CsvLayout(MappingTable):
     """How a table of numbers is written in a CSV file that does not begin with one line of names."""
 
     skip_lines: Count = 0
-    """Lines at the beginning that are no part of the table."""
+    """Lines at the beginning that are no part of the table; empty lines and comments (``#``) do not count."""
+    skip_last_lines: Count = 0
+    """Lines at the end that are no part of the table, such as largest and mean values."""
     names: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     """Names of the columns; if left out, they are in the first line that is not skipped."""
     separator: Literal[",", ";", "\t", " "] | None = None
     """What separates columns (a space: any number of them); if left out, comma, semicolon or tab, whichever is commonest."""
     decimal: Literal[".", ","] = "."
     """Decimal point or comma."""
+    encoding: Encoding | None = None
+    """Encoding of the text; if left out, UTF-16 by its mark or its zeros, UTF-8 if it is that, else that of Windows."""
 
 
 class SampledChannel(SignalMapping):

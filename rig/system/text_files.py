@@ -2,7 +2,10 @@
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from rig.errors import ConfigurationError, RigError
 
@@ -11,20 +14,21 @@ _KINDS = {stat.S_IFDIR: "folder", stat.S_IFIFO: "FIFO", stat.S_IFCHR: "device", 
 _RAW = getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
-def read_bytes(path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError) -> bytes:
-    """Return the content of a regular file; raise ``error`` for another kind, more than ``largest_bytes``, or a failure."""
+@contextmanager
+def open_regular(
+    path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError
+) -> Iterator[BinaryIO]:
+    """Open a regular file; raise ``error`` for another kind, more than ``largest_bytes``, or a failure."""
     try:
         descriptor = os.open(path, os.O_RDONLY | _AT_ONCE | _RAW)
         with os.fdopen(descriptor, "rb", closefd=True) as stream:
-            kind = os.fstat(descriptor)
-            if not stat.S_ISREG(kind.st_mode):
-                named = _KINDS.get(stat.S_IFMT(kind.st_mode), "special file")
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode):
+                named = _KINDS.get(stat.S_IFMT(status.st_mode), "special file")
                 raise error(f"{path}: is a {named}, allowed is a regular file")
-            read = b"" if kind.st_size > largest_bytes else stream.read(largest_bytes + 1)
-            if kind.st_size > largest_bytes or len(read) > largest_bytes:
-                size = max(kind.st_size, len(read))
-                raise error(f"{path}: has {size} bytes, allowed are up to {largest_bytes}")
-            return read
+            if status.st_size > largest_bytes:
+                raise error(f"{path}: has {status.st_size} bytes, allowed are up to {largest_bytes}")
+            yield stream
     except FileNotFoundError:
         raise error(f"{path}: there is no such file") from None
     except IsADirectoryError:
@@ -33,8 +37,18 @@ def read_bytes(path: Path, largest_bytes: int, error: type[RigError] = Configura
         raise error(f"{path}: may not be read (permission denied)") from None
     except OSError as failure:
         raise error(f"{path}: cannot be read ({failure.strerror})") from None
+
+
+def read_bytes(path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError) -> bytes:
+    """Return the content of a regular file; raise ``error`` for another kind, more than ``largest_bytes``, or a failure."""
+    try:
+        with open_regular(path, largest_bytes, error) as stream:
+            read = stream.read(largest_bytes + 1)
     except ValueError as failure:  # a NUL in its name
         raise error(f"{str(path)!r}: is not the name of a file ({failure})") from None
+    if len(read) > largest_bytes:  # it grew
+        raise error(f"{path}: has {len(read)} bytes, allowed are up to {largest_bytes}")
+    return read
 
 
 def read_text(

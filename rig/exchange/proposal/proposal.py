@@ -11,10 +11,10 @@ from identification.mapping import CsvLayout
 from rig.exchange.child_reading import ImportFailed, read_in_child
 from rig.exchange.file_data import MappingText
 from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
-from rig.exchange.proposal.csv_guess import guessed_layout
 from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_of, rate_in, role_of, transient_periods
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
+from rig.exchange.tables.guess import guessed_layout
 
 _MIN_SAMPLES = 16  # samples of the shortest signal; chosen
 _MAX_CHANNELS = 16  # channels that are proposed; chosen
