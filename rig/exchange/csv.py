@@ -16,7 +16,8 @@ import numpy as np
 from rig.errors import RecordingError
 from rig.exchange.child_reading import NOT_OURS, ImportFailed
 from rig.exchange.file_data import FileData, StoredObject, from_variables
-from rig.exchange.tables.text import blocks, encoding_of
+from rig.exchange.tables.text import LARGEST_BYTES, blocks, encoding_of
+from rig.system.text_files import open_regular
 from rig.text.contents import Array, Contents
 from vibrolock.arrays import Float
 
@@ -70,8 +71,10 @@ def columns_in(path: Path, layout: Mapping[str, object] | None = None) -> FileDa
     from identification.mapping import CsvLayout
     from rig.exchange.tables.reading import read_table
 
+    with open_regular(path, LARGEST_BYTES, ImportFailed) as stream:
+        ours = stream.read(len(_KIND)) == _KIND.encode() and table_of_ours(path) is not None
     found = read_table(path, None if layout is None else CsvLayout.model_validate(layout))
-    return from_variables(found.values) if table_of_ours(path) is not None else found
+    return from_variables(found.values) if ours else found
 
 
 def stored_table(path: Path) -> StoredObject:

@@ -2,7 +2,6 @@
 
 import codecs
 import io
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +12,7 @@ LARGEST_BYTES = 1_000_000_000  # largest file that is read, bytes; chosen
 _BLOCK = 1 << 20  # bytes or characters that are read at once; chosen
 _HEAD = 4096  # bytes by which UTF-16 without a mark is told; chosen
 _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
-_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x19\x1c-\x1f]")  # control characters that no table has
+_NO_TEXT = bytes({*range(32)} - {*b"\t\n\v\f\r\x1a\x1b"})  # control characters that no table has
 _UTF8 = "utf-8-sig"
 """UTF-8, with or without its mark."""
 _ANSI = "cp1252"
@@ -32,10 +31,9 @@ def encoding_of(path: Path) -> str:
             return known
         decoder, place, wrong = codecs.getincrementaldecoder("utf-8")(), 0, ""
         while True:
-            if (control := _NO_TEXT.search(block)) is not None:
-                raise ImportFailed(
-                    f"{path}: is no text in UTF-8 ({wrong or f'byte {place + control.start()}: a control character'})"
-                )
+            if len(block.translate(None, _NO_TEXT)) < len(block):
+                at = place + next(at for at, byte in enumerate(block) if byte in _NO_TEXT)
+                raise ImportFailed(f"{path}: is no text in UTF-8 ({wrong or f'byte {at}: a control character'})")
             try:
                 if not wrong:
                     decoder.decode(block, final=not block)
