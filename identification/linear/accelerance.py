@@ -128,8 +128,8 @@ def motion_factors(responses: FrequencyResponseMatrix) -> Complex:
     Raises `IdentificationError` if the lines begin at 0 Hz.
     """
     if responses.frequency_hz[0] == 0.0:
-        reason = "begins at 0 Hz, where no motion is an acceleration; select a band above"
-        raise IdentificationError(reason, field="frequency_hz")
+        reason = "begins at 0 Hz, where no motion is an acceleration"
+        raise IdentificationError(reason, field="frequency_hz", hint="leave this line out by `band_hz`")
     order = [0 if channel.role == "force" else 2 - MOTION_ORDER[channel.motion] for channel in responses.outputs]
     return np.asarray(responses.s[:, None] ** np.array(order))
 

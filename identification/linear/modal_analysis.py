@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, first_weighting, weighted_accelerance
 from identification.linear.errors_in_variables import DrivenResponses, driven_responses, is_driven, over_force
-from identification.linear.modal_parameters import accepted, as_linear_modes, modal_notes
+from identification.linear.modal_parameters import accepted, as_linear_modes, drive_of, modal_notes
 from identification.linear.model_errors import (
     is_mostly_distortion,
     systematic_misfit,
@@ -66,15 +65,16 @@ def linear_modes(
     """Identify linear modes from the frequency responses of all motions to a single drive force.
 
     A frequency-domain subspace method of rising order gives the initial poles (`stabilisation`). A weighted least-squares fit
-    of a modal model with residual terms gives the result. Shapes are mass-normalised by the residue at the drive point.
+    of a modal model with residual terms gives the result. Shapes are mass-normalised by the residue at the drive point; without a drive point
+    frequencies and damping are the same, and the largest shape of each mode is 1.
 
-    Raises `IdentificationError` without exactly one drive channel and one force, with too few lines, or where no mode
-    is found.
+    Raises `IdentificationError` without exactly one force, with several drive channels, with too few lines, or where no
+    mode is found.
 
     Parameters
     ----------
     responses
-        Motions over the force, one motion of role ``drive``, preferably estimated with the voltage as instrument. Better
+        Motions over the force, one of them of role ``drive`` for mass-normalised shapes, preferably estimated with the voltage as instrument. Better
         still are force and motions over the voltage (``best_linear_approximation(..., inputs=("voltage",), outputs=("force",
         ...))``): their noise is weighted correctly even where it exceeds the force (`errors_in_variables`).
     modes
@@ -96,14 +96,14 @@ def linear_modes(
     diagram
         The stabilisation diagram of these responses, if it is known already.
     """
-    find_role(responses.outputs, "drive")
+    drive_of(responses.outputs)
     free, scatter = weighting == "auto", weighting == "total" and responses.total_covariance is None
     weighting, normal = first_weighting(responses, weighting), not complex_residues
     driven = is_driven(responses)
     if not driven and (len(responses.inputs) != 1 or responses.inputs[0].role != "force"):
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in responses.inputs)
         raise IdentificationError(
-            f"are {names}; modes need the responses to one force, at the drive point, or that force among the outputs",
+            f"are {names}; modes need the responses to one force, or that force among the outputs",
             field="inputs",
         )
     selected = responses.select(
@@ -185,7 +185,7 @@ def _without_spurious(
 ) -> tuple[ModalFit, list[str]]:
     """Fit, drop poles that are not modes (or the least prominent if a number was requested), and repeat until all are modes."""
     notes: list[str] = []
-    drive, whole = find_role(band.outputs, "drive"), np.inf
+    drive, whole = drive_of(band.outputs), np.inf
     while True:
         fit = fit_modes(data, poles, normal=normal)
         if fit.residual > _NEEDED * max(whole, 1.0):

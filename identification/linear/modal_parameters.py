@@ -1,8 +1,10 @@
-"""Convert the parameters of a fit to modes: normalisation by the drive-point residue, standard errors, rejections, notes."""
+"""Convert the parameters of a fit to modes: normalisation by the drive-point residue if there is one, standard errors, rejections, notes."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
-from identification.channels import find_role
+from identification.channels import Channel, find_role
 from identification.linear.accelerance import WeightedResponses
 from identification.linear.modes import LinearModes, mac_matrix
 from identification.linear.rational_fractions import RESIDUAL_TERMS, ModalFit, fit_modes
@@ -44,16 +46,33 @@ def _residues(poles: Float, terms: Float, normal: bool) -> Complex:
     return np.asarray(terms[:, :count] + terms[:, count : 2 * count] * omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2)))
 
 
-def accepted(fit: ModalFit, data: WeightedResponses, drive: int, *, normal: bool) -> tuple[list[str], Float]:
+def drive_of(channels: Sequence[Channel]) -> int | None:
+    """Return the index of the drive channel; None if there is none. Raises `IdentificationError` if there are several."""
+    return find_role(channels, "drive") if any(channel.role == "drive" for channel in channels) else None
+
+
+def _prominence(fit: ModalFit, drive: int | None, *, normal: bool) -> tuple[Float, Float]:
+    """Return a residue of each mode and its standard error: at the drive point, or else where it stands out most."""
+    terms, count = fit.terms.shape[1], fit.omega.size
+    std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    residues = _residues(fit.poles, fit.terms, normal)
+    errors = std[fit.poles.size :].reshape(-1, terms)[:, :count]
+    if drive is not None:
+        return residues[drive].real, errors[drive]
+    row = np.argmax(np.abs(residues) / np.maximum(errors, 1e-300), axis=0)
+    return np.abs(residues)[row, np.arange(count)], errors[row, np.arange(count)]
+
+
+def accepted(fit: ModalFit, data: WeightedResponses, drive: int | None, *, normal: bool) -> tuple[list[str], Float]:
     """Return why each pole is not a mode (empty if it is one), and its prominence.
 
-    The prominence is the drive-point residue over its standard error.
+    The prominence is the residue over its standard error: that at the drive point, or the largest without one.
     """
     omega, zeta = fit.omega, fit.zeta
-    count, terms = omega.size, fit.terms.shape[1]
+    count = omega.size
     std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    residue = _residues(fit.poles, fit.terms, normal)[drive].real
-    residue_std = std[fit.poles.size + drive * terms :][:count]
+    residue, residue_std = _prominence(fit, drive, normal=normal)
+    what = "residue" if drive is None else "drive-point residue"
     band = 2.0 * np.pi * data.frequency_hz[[0, -1]]
     reasons = []
     for k in range(count):
@@ -64,7 +83,7 @@ def accepted(fit: ModalFit, data: WeightedResponses, drive: int, *, normal: bool
         elif zeta[k] <= 0.0:
             reasons.append(f"has a damping ratio of {100 * zeta[k]:.3g} %")
         elif residue[k] <= _SIGNIFICANT * residue_std[k]:
-            reasons.append(f"has a drive-point residue of {residue[k]:.3g} +- {residue_std[k]:.3g} 1/kg")
+            reasons.append(f"has a {what} of {residue[k]:.3g} +- {residue_std[k]:.3g} 1/kg")
         elif std[count + k] > _LARGEST_DAMPING_ERROR * zeta[k]:
             reasons.append(f"has a damping ratio of {100 * zeta[k]:.3g} +- {100 * std[count + k]:.3g} %")
         else:
@@ -80,16 +99,18 @@ def as_linear_modes(
     It grows with the square of a misfit above 1 (the Birge ratio): what the model misses moves its parameters as noise of that
     size would. The systematic part (`model_errors`) is added.
     """
-    drive = find_role(band.outputs, "drive")
+    drive = drive_of(band.outputs)
     rows, count, terms = len(band.outputs), fit.omega.size, fit.terms.shape[1]
     nonlinear = fit.poles.size
     parameters = np.concatenate([fit.poles, fit.terms.ravel()])
+    largest = np.argmax(np.abs(_residues(fit.poles, fit.terms, normal)), axis=0)
 
     def modes(values: Float) -> Float:
         """Frequencies (Hz), damping ratios and shapes row by row, in one vector."""
         poles = values[:nonlinear]
         residues = _residues(poles, values[nonlinear:].reshape(rows, terms), normal)
-        shapes = (residues / np.sqrt(residues[drive])).real
+        by = residues[largest, np.arange(count)] if drive is None else np.sqrt(residues[drive])
+        shapes = (residues / by).real
         return np.concatenate([poles[:count] / (2.0 * np.pi), poles[count:-1], shapes.ravel()])
 
     std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
@@ -130,14 +151,17 @@ def as_linear_modes(
         force_unit=band.inputs[0].unit,
         fit_residual=fit.residual,
         covariance=covariance,
-        residues=None if normal else _residues(fit.poles, fit.terms, False)[:, rise],
+        residues=None if normal and drive is not None else _residues(fit.poles, fit.terms, normal)[:, rise],
         specimen=band.specimen,
     )
 
 
 def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) -> list[str]:
     """Return notes, one line each, on modes that are close, poorly resolved or complex, and on a poor fit."""
-    notes = [] if converged else ["the fit did not come to rest: the poles depend on where it began"]
+    notes = (
+        [] if modes.normalised else ["no drive point: shapes are not mass-normalised, the largest of each mode is 1"]
+    )
+    notes += [] if converged else ["the fit did not come to rest: the poles depend on where it began"]
     frequency, bandwidth = modes.frequency_hz, 2.0 * modes.damping_ratio * modes.frequency_hz
     alike = mac_matrix(modes, modes)
     for k in range(frequency.size - 1):

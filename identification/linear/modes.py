@@ -37,19 +37,22 @@ _OPTIONAL = ("covariance", "residues", "small_terms")
 class LinearModes(Result):
     """Linear modes of a structure, lowest frequency first.
 
-    Raises `IdentificationError` if array shapes do not agree, there is not exactly one drive channel, or frequencies
-    are not positive and rising.
+    Without a drive point the shapes are not mass-normalised: the largest of each mode is 1, and ``residues`` hold the rest.
+
+    Raises `IdentificationError` if array shapes do not agree, there are several drive channels, or none and no residues, or
+    frequencies are not positive and rising.
 
     Parameters
     ----------
     channels
-        The motions, one per row of ``shapes``; the one of role ``drive`` is where the force acts.
+        The motions, one per row of ``shapes``; the one of role ``drive``, if there is one, is where the force acts.
     frequency_hz, frequency_std_hz
         float[n_modes], undamped natural frequencies ``w / 2 pi`` and their standard errors (NaN if unknown).
     damping_ratio, damping_ratio_std
         float[n_modes].
     shapes, shapes_std
-        float[n_channels, n_modes], mass-normalised deflection, kg^-1/2, positive at the drive point.
+        float[n_channels, n_modes], mass-normalised deflection, kg^-1/2, positive at the drive point; without one, the
+        deflection over the largest of its mode.
     phase_collinearity
         float[n_modes], modal phase collinearity in [0, 1]: 1 if the complex residues of a mode lie on one line; NaN if
         unknown.
@@ -66,8 +69,8 @@ class LinearModes(Result):
     covariance
         float[m, m], covariance of ``(frequency_hz, damping_ratio, shapes row by row)``; None if unknown.
     residues
-        complex[n_channels, n_modes], residues rho (1/kg) if they were fitted as complex; None for normal modes, whose
-        residues are ``phi_o phi_d``.
+        complex[n_channels, n_modes], residues rho (1/kg) if they were fitted as complex or there is no drive point; None for
+        normal modes, whose residues are ``phi_o phi_d``.
     fit_residual
         RMS of residual over expected error; 1 if only noise is left; NaN if unknown.
     specimen
@@ -103,7 +106,12 @@ class LinearModes(Result):
 
     def __post_init__(self) -> None:
         convert_fields(self, tuple, "channels", "notes")
-        find_role(self.channels, "drive")
+        if self.normalised:
+            find_role(self.channels, "drive")
+        elif self.residues is None:
+            raise IdentificationError(
+                "none has the role 'drive'", field="channels", hint="without one residues are needed"
+            )
         modes, rows = np.size(self.frequency_hz), len(self.channels)
         parameters = modes * (2 + rows)
         for names, shape, dtype in (
@@ -129,13 +137,24 @@ class LinearModes(Result):
             raise IdentificationError(field="frequency_hz", allowed=allowed)
 
     @property
+    def normalised(self) -> bool:
+        """Whether the shapes are mass-normalised, which takes a drive point."""
+        return any(channel.role == "drive" for channel in self.channels)
+
+    @property
     def drive_row(self) -> int:
-        """Row of the drive-point channel."""
+        """Row of the drive-point channel; raises `IdentificationError` without one."""
+        if not self.normalised:
+            raise IdentificationError(
+                "have no drive point, so that their shapes are not mass-normalised",
+                field="modes",
+                hint="measure the motion where the force acts, as a channel of role drive",
+            )
         return find_role(self.channels, "drive")
 
     @property
     def drive_shape(self) -> Float:
-        """float[n_modes]: shapes at the drive point, kg^-1/2."""
+        """float[n_modes]: shapes at the drive point, kg^-1/2; raises `IdentificationError` without one."""
         return np.asarray(self.shapes[self.drive_row])
 
     def nearest(self, frequency_hz: float) -> int:
@@ -145,8 +164,10 @@ class LinearModes(Result):
     def mode_shapes(self, mode: int = 0, *, modes: int | None = None) -> ModeShapes:
         """Return the shapes with which the modal amplitude of ``mode`` is computed.
 
-        They are those of the ``modes`` modes nearest to it; if None, as many as there are channels.
+        They are those of the ``modes`` modes nearest to it; if None, as many as there are channels. Raises
+        `IdentificationError` without a drive point.
         """
+        assert self.drive_row >= 0
         count = min(len(self.channels), self.frequency_hz.size) if modes is None else modes
         order = np.argsort(np.abs(self.frequency_hz - self.frequency_hz[mode]), kind="stable")[:count]
         return ModeShapes(tuple(c.name for c in self.channels), self.shapes[:, order], 0)
@@ -200,8 +221,9 @@ class LinearModes(Result):
 
     def table(self) -> list[dict[str, float | None]]:
         """Return one JSON-able dictionary per mode, with None for unknown values."""
-        names = (*_POLES[:4], "drive_shape", "phase_collinearity")
-        return table_rows({name: getattr(self, name) for name in names})
+        drive_shape = self.drive_shape if self.normalised else np.full(self.frequency_hz.size, np.nan)
+        known = {name: getattr(self, name) for name in _POLES}
+        return table_rows({**dict(list(known.items())[:4]), "drive_shape": drive_shape, _POLES[4]: known[_POLES[4]]})
 
 
 def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:

@@ -229,7 +229,7 @@ def _plant(found: _Evidence, bench: Bench, plant: PlantModel, ratios: Mapping[st
 
 def _linear_modes(found: _Evidence, bench: Bench, name: str, modes: LinearModes) -> None:
     tested = int(np.argmin(np.abs(modes.frequency_hz - bench.specimen.linear_frequency_hz)))
-    drive = next(i for i, channel in enumerate(modes.channels) if channel.role == "drive")
+    drive = modes.drive_row
     facts = {
         "frequency_hz": (modes.frequency_hz[tested], modes.frequency_std_hz[tested], 1e-3),
         "damping_ratio": (modes.damping_ratio[tested], modes.damping_ratio_std[tested], 0.2),

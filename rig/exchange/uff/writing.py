@@ -174,6 +174,10 @@ def _frequency_responses(item: Contents) -> Iterator[Dataset]:
 def _modes(item: Contents) -> Iterator[Dataset]:
     """Yield one dataset 55 per normal mode: modal mass 1 kg, shape in +Z; lines 3 to 5 name the channels of the nodes."""
     channels = _channels(item)
+    if not any(channel.role == "drive" for channel in channels):
+        raise RecordingError(
+            "the modes have no drive point and so no modal mass, which universal files need; use mat or csv"
+        )
     degrees = degrees_of_freedom(channels)
     lines = channel_lines(channels)
     for mode, frequency in enumerate(item.arrays["frequency_hz"]):

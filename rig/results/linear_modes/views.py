@@ -149,7 +149,7 @@ def _stabilisation(
 
 
 def _shapes(axis: Axes, modes: LinearModes) -> None:
-    """Draw the mass-normalised shape of every mode, one group of bars per channel, with 95 % intervals."""
+    """Draw the shape of every mode, one group of bars per channel, with 95 % intervals."""
     count = modes.frequency_hz.size
     width = 0.8 / count
     at = np.arange(len(modes.channels))
@@ -161,7 +161,7 @@ def _shapes(axis: Axes, modes: LinearModes) -> None:
         axis.bar(x, modes.shapes[:, mode], 0.9 * width, yerr=error, color=colour, label=label, capsize=2)
     axis.axhline(0.0, color=REJECTED, lw=0.8)
     axis.set_xticks(at, [channel.name for channel in modes.channels])
-    axis.set_ylabel("shape, kg$^{-1/2}$")
+    axis.set_ylabel("shape, kg$^{-1/2}$" if modes.normalised else "shape over its largest")
     legend_above(axis, min(count, 2))
 
 

@@ -104,8 +104,6 @@ def test_a_reversed_force_or_drive_channel_is_refused_and_polarity_named(signs: 
 
 def test_what_a_modal_analysis_needs_is_asked_for() -> None:
     responses = measured(7, 0.5)
-    with refused(IdentificationError, "drive", field="channels"):
-        linear_modes(responses.select(["tip"]))
     with refused(IdentificationError, "lines-are-too-few-for-block", field="frequency_hz"):
         linear_modes(responses.select(lowest_hz=20.0, highest_hz=20.1), orders=[40])
     with refused(IdentificationError, "the-responses-have-no-noise-covariance", field="weighting", value="noise"):
