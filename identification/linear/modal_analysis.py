@@ -65,8 +65,8 @@ def linear_modes(
     """Identify linear modes from the frequency responses of all motions to a single drive force.
 
     A frequency-domain subspace method of rising order gives the initial poles (`stabilisation`). A weighted least-squares fit
-    of a modal model with residual terms gives the result. Shapes are mass-normalised by the residue at the drive point; without a drive point
-    frequencies and damping are the same, and the largest shape of each mode is 1.
+    of a modal model with residual terms gives the result. Shapes are mass-normalised by the residue at the drive point;
+    without a drive point frequencies and damping are the same, and the largest shape of each mode is 1.
 
     Raises `IdentificationError` without exactly one force, with several drive channels, with too few lines, or where no
     mode is found.
@@ -74,9 +74,10 @@ def linear_modes(
     Parameters
     ----------
     responses
-        Motions over the force, one of them of role ``drive`` for mass-normalised shapes, preferably estimated with the voltage as instrument. Better
-        still are force and motions over the voltage (``best_linear_approximation(..., inputs=("voltage",), outputs=("force",
-        ...))``): their noise is weighted correctly even where it exceeds the force (`errors_in_variables`).
+        Motions over the force, one of them of role ``drive`` for mass-normalised shapes, preferably estimated with the voltage
+        as instrument. Better still are force and motions over the voltage (``best_linear_approximation(...,
+        inputs=("voltage",), outputs=("force", ...))``): their noise is weighted correctly even where it exceeds the force
+        (`errors_in_variables`).
     modes
         None: all poles that are stable in the stabilisation diagram, less those that the fit rejects as modes. A number: that
         many of the most prominent modes. Frequencies (Hz): one mode near each. Modes of another level: the fit starts from

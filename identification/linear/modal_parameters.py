@@ -1,4 +1,4 @@
-"""Convert the parameters of a fit to modes: normalisation by the drive-point residue if there is one, standard errors, rejections, notes."""
+"""Convert the parameters of a fit to modes: normalisation by a drive-point residue, standard errors, rejections, notes."""
 
 from collections.abc import Sequence
 
