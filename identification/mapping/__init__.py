@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
+    from identification.mapping.instants import EvenSampling as EvenSampling, even_sampling as even_sampling
     from identification.mapping.time_data import (
         CsvLayout as CsvLayout,
         SampledChannel as SampledChannel,
         Stretch as Stretch,
     )
-    from identification.mapping.units import UNITS as UNITS, si_of as si_of
+    from identification.mapping.units import SIGNALS as SIGNALS, UNITS as UNITS, si_of as si_of
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from identification.channels import Channel, Role
 from identification.errors import IdentificationError
-from identification.mapping.units import UNITS, si_of
+from identification.mapping.units import UNITS, is_signal_unit, si_of
 from vibrolock.arrays import Complex, Float
 from vibrolock.described import Described
 from vibrolock.errors import InputError
@@ -114,6 +114,8 @@ class MeasurementMapping(MappingTable):
     """Name of what was tested."""
     source: str = ""
     """Where the data comes from; for information only."""
+    against_file: bool = False
+    """Whether the mapping holds where the file says otherwise of its sampling: rates, start times, unit of the instants."""
 
 
 class ChannelMapping(MappingTable):
@@ -125,10 +127,12 @@ class ChannelMapping(MappingTable):
     """``force``, ``drive`` (motion where the force acts), ``response`` or ``monitor`` (such as a voltage)."""
     unit: str
     """Unit of the stored numbers."""
+    against_file: bool = False
+    """Whether the mapping holds where the file says otherwise of this channel: unit, scale, offset, rate, start time."""
 
     @model_validator(mode="after")
     def _known(self) -> "ChannelMapping":
-        if self.role != "monitor" and self.unit not in UNITS:
+        if self.role != "monitor" and not is_signal_unit(self.unit):
             raise ValueError(f"unit = '{self.unit}' of channel '{self.name}': allowed is one of {', '.join(UNITS)}")
         return self
 
@@ -182,7 +186,7 @@ def in_si(channels: Sequence[ChannelMapping]) -> tuple[tuple[Channel, ...], NDAr
     """Return the channels in SI units and the factors that convert to them; monitors in unknown units keep their units."""
     found, factors = [], []
     for channel in channels:
-        monitor = channel.role == "monitor" and channel.unit not in UNITS
+        monitor = channel.role == "monitor" and not is_signal_unit(channel.unit)
         unit, factor = (channel.unit, 1.0) if monitor else si_of(channel.unit, f"unit of channel '{channel.name}'")
         found.append(Channel(channel.name, channel.role, unit))
         factors.append(factor)

@@ -8,7 +8,15 @@ from pydantic import Field, model_validator
 from identification.hammer.hammer_test import hammer_test
 from identification.hammer.result import HammerTest
 from identification.mapping.base import MeasurementMapping, NotNegative, Path, Positive, check_names, entries_at, in_si
-from identification.mapping.sampling import SignalMapping, common_rate_hz, instants_at, rate_of_file_hz, stored_records
+from identification.mapping.sampling import (
+    SignalMapping,
+    TimeUnit,
+    common_rate_hz,
+    instants_at,
+    rate_of_file_hz,
+    seconds_of_time,
+    stored_records,
+)
 
 
 class HammerChannel(SignalMapping):
@@ -27,7 +35,9 @@ class HammerTestMapping(MeasurementMapping):
     sample_rate_hz: Positive | None = None
     """Samples per second; if left out, taken from ``time`` or from the file."""
     time: Path | None = None
-    """Path of the instants in seconds."""
+    """Path of the instants."""
+    time_unit: TimeUnit = ""
+    """Unit of the instants, such as ``ms``; if left out, the file's, or else seconds."""
     records: Path | None = None
     """Path of a list with one structure per record; the other paths are relative to these structures."""
     record_s: Positive | None = None
@@ -71,7 +81,7 @@ def map_hammer_test(data: Any, mapping: HammerTestMapping) -> HammerTest:
     ]
     rate = mapping.sample_rate_hz
     if rate is None and mapping.time is not None:
-        rate = instants_at(entries[0], mapping.time)[0]
+        rate = instants_at(entries[0], mapping.time, seconds_of_time(data, mapping.time_unit)).rate_hz
     return hammer_test(
         records,
         channels,

@@ -6,7 +6,15 @@ from pydantic import Field
 
 from identification.errors import IdentificationError
 from identification.mapping.base import MeasurementMapping, Path, Positive, entries_at, in_si
-from identification.mapping.sampling import SignalMapping, common_rate_hz, instants_at, rate_of_file_hz, stored_records
+from identification.mapping.sampling import (
+    SignalMapping,
+    TimeUnit,
+    common_rate_hz,
+    instants_at,
+    rate_of_file_hz,
+    seconds_of_time,
+    stored_records,
+)
 from identification.multisine.design import MultisineDesign
 from identification.multisine.spectra import PeriodicSpectra, periodic_spectra
 
@@ -18,7 +26,9 @@ class MultisineMapping(MeasurementMapping):
     sample_rate_hz: Positive | None = None
     """Samples per second; if left out, taken from ``time`` or from the file."""
     time: Path | None = None
-    """Path of the instants in seconds."""
+    """Path of the instants."""
+    time_unit: TimeUnit = ""
+    """Unit of the instants, such as ``ms``; if left out, the file's, or else seconds."""
     period_samples: Annotated[int, Field(ge=3)]
     """Number of samples in a period."""
     lowest_hz: Positive
@@ -49,7 +59,11 @@ def map_multisine(data: Any, mapping: MultisineMapping) -> PeriodicSpectra:
     rate = common_rate_hz(
         {
             "sample_rate_hz": mapping.sample_rate_hz,
-            "time": None if mapping.time is None else instants_at(entries[0], mapping.time)[0],
+            "time": None
+            if mapping.time is None
+            else instants_at(
+                entries[0], mapping.time, seconds_of_time(data, mapping.time_unit), mapping.sample_rate_hz
+            ).rate_hz,
             "file": rate_of_file_hz(data),
         }
     )

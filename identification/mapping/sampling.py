@@ -1,18 +1,33 @@
 """Sample rate of data that a mapping describes."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator
 
 from identification.errors import IdentificationError
 from identification.mapping.base import ChannelMapping, Path, numbers, value_at
+from identification.mapping.instants import EvenSampling, even_sampling, uneven_remark
+from vibrolock.errors import InputError
+from vibrolock.quantities import seconds_in
 
 _SAME = 1e-6
 """Largest relative difference of sample rates that count as one."""
-_UNEVEN = 1e-3
-"""Largest difference of a step from the mean step."""
+TIME_UNITS = ("s", "ms", "us", "ns", "min", "h")
+"""Usual units of instants; other spellings are understood as well."""
+
+
+def checked_time_unit(unit: str) -> str:
+    """Return a unit of time; raise `InputError` for any other."""
+    if unit and seconds_in(unit) is None:
+        raise InputError(field="time_unit", value=unit, allowed=TIME_UNITS)
+    return unit
+
+
+TimeUnit = Annotated[str, AfterValidator(checked_time_unit)]
+"""Unit of instants; empty for that of the file, or else seconds."""
 
 
 class SignalMapping(ChannelMapping):
@@ -39,14 +54,23 @@ def rate_of_file_hz(data: Any) -> float | None:
     return rate if isinstance(rate, float) else None
 
 
-def instants_at(data: Any, path: str) -> tuple[float, float]:
-    """Return the sample rate (Hz) and the first of the instants (s) at a path; raise `IdentificationError` for uneven ones."""
-    instants: NDArray[np.float64] = np.asarray(numbers(value_at(data, path, "time"), 1, "time"), dtype=np.float64)
-    steps = np.diff(instants)
-    step = (instants[-1] - instants[0]) / max(steps.size, 1) if instants.size else 0.0
-    if not steps.size or not step > 0.0 or np.any(np.abs(steps - step) > _UNEVEN * step):
-        raise IdentificationError(f"time '{path}': is not evenly spaced; resample the signals")
-    return float(1.0 / step), float(instants[0])
+def instants_at(data: Any, path: str, seconds: float = 1.0, wanted_hz: float | None = None) -> EvenSampling:
+    """Return the sampling of the instants at a path, in units of ``seconds``; raise `IdentificationError` for uneven ones."""
+    instants = numbers(value_at(data, path, "time"), 1, "time")
+    found = even_sampling(instants, seconds, wanted_hz)
+    if found is None:
+        raise IdentificationError(f"time '{path}': {uneven_remark(instants)}")
+    return found
+
+
+def seconds_of_time(data: Any, time_unit: str) -> float:
+    """Return the seconds in the unit of the instants: that of a mapping, or else that of the file, or else seconds."""
+    told = data.get("__time_unit__") if isinstance(data, Mapping) else None
+    unit = time_unit or (told if isinstance(told, str) else "") or "s"
+    found = seconds_in(unit)
+    if found is None:
+        raise IdentificationError(field="time_unit", value=unit, allowed=TIME_UNITS)
+    return found
 
 
 def common_rate_hz(told: Mapping[str, float | None]) -> float:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from identification.mapping.base import MappingTable, MeasurementMapping, NotNegative, Path, Positive, check_names
-from identification.mapping.sampling import SignalMapping
+from identification.mapping.sampling import SignalMapping, TimeUnit
 from vibrolock.errors import InputError
 
 Axis = Literal["sample", "channel", "period", "realisation", "level"]
@@ -102,7 +102,9 @@ class TimeDataMapping(MeasurementMapping):
     sample_rate_hz: Positive | None = None
     """Samples per second; if left out, taken from ``time`` or from the file."""
     time: Path | None = None
-    """Path of the instants in seconds."""
+    """Path of the instants."""
+    time_unit: TimeUnit = ""
+    """Unit of the instants, such as ``ms``; if left out, the file's, or else seconds."""
     records: Path | None = None
     """Path of a list with one structure per record; the other paths are relative to these structures."""
     axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = ("sample", "realisation")

@@ -11,7 +11,7 @@ from identification.experiments.periodicity import check_periods, period_remark
 from identification.experiments.time_experiments import resampled_periods
 from identification.experiments.time_records import TimeRecord, TimeRecords
 from identification.mapping.base import entries_at, in_si, value_at
-from identification.mapping.sampling import common_rate_hz, instants_at, rate_of_file_hz
+from identification.mapping.sampling import common_rate_hz, instants_at, rate_of_file_hz, seconds_of_time
 from identification.mapping.series import common_length, series
 from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
 from identification.signals.decimation import EDGE_SAMPLES, decimated
@@ -149,7 +149,9 @@ def _sampling(
         if isinstance(starts, Mapping) and isinstance(begin := starts.get(channel.value), float):
             start = begin
     if mapping.time is not None and _holds(entry, mapping.time, alone=not channel.file):
-        told[f"time{' of ' if channel.file else ''}{channel.file}"], start = instants_at(entry, mapping.time)
+        wanted = next((rate for rate in (mapping.sample_rate_hz, *told.values()) if rate is not None), None)
+        found = instants_at(entry, mapping.time, seconds_of_time(file, mapping.time_unit), wanted)
+        told[f"time{' of ' if channel.file else ''}{channel.file}"], start = found.rate_hz, found.start_s
     return told, start
 
 

@@ -1,36 +1,35 @@
-"""Units that imported measurements may have."""
+"""Units that imported measurements may have: those of a force, a motion, a voltage or a ratio in `vibrolock.quantities`."""
 
 from identification.errors import IdentificationError
+from vibrolock.quantities import Quantity, quantity
 
-GRAVITY = 9.80665  # m/s2, standard
-_INCH, _POUND = 0.0254, 4.4482216152605  # m; N per pound-force
+SIGNALS = ("m", "m/s", "m/s2", "N", "V", "1")
+"""SI units of the signals of a test."""
+_LISTED = (
+    *("m", "mm", "um", "in", "mil", "ft", "m/s", "mm/s", "in/s", "m/s2", "mm/s2", "in/s2", "g"),
+    *("N", "mN", "kN", "lbf", "kgf", "V", "mV", "1"),
+)
+
+
+def _known(unit: str) -> Quantity | None:
+    found = quantity(unit)
+    return found if found is not None and found.si in SIGNALS else None
+
 
 UNITS: dict[str, tuple[str, float]] = {
-    **{"m": ("m", 1.0), "mm": ("m", 1e-3), "um": ("m", 1e-6), "in": ("m", _INCH), "ft": ("m", 12.0 * _INCH)},
-    **{"m/s": ("m/s", 1.0), "mm/s": ("m/s", 1e-3), "in/s": ("m/s", _INCH)},
-    **{"m/s2": ("m/s2", 1.0), "m/s^2": ("m/s2", 1.0), "mm/s2": ("m/s2", 1e-3), "mm/s^2": ("m/s2", 1e-3)},
-    **{"in/s2": ("m/s2", _INCH), "in/s^2": ("m/s2", _INCH), "g": ("m/s2", GRAVITY)},
-    **{"N": ("N", 1.0), "mN": ("N", 1e-3), "kN": ("N", 1e3), "lbf": ("N", _POUND), "kgf": ("N", GRAVITY)},
-    **{"V": ("V", 1.0), "mV": ("V", 1e-3), "1": ("1", 1.0)},
+    name: (found.si, float(found.factor)) for name in _LISTED if (found := _known(name)) is not None
 }
-"""SI unit of every known unit, and the factor to it."""
+"""SI unit of the usual units, and the factor to it; other spellings and prefixes are understood as well."""
 
-_SPELLINGS = {
-    "m/s²": "m/s2",
-    "m/s**2": "m/s2",
-    "m/sec^2": "m/s2",
-    "lb": "lbf",
-    "G": "g",
-    "gn": "g",
-    "µm": "um",
-    "volt": "V",
-}
+
+def is_signal_unit(unit: str) -> bool:
+    """Return whether a unit is one of a force, a motion, a voltage or a ratio."""
+    return _known(unit) is not None
 
 
 def si_of(unit: str, where: str) -> tuple[str, float]:
-    """Return the SI unit and the factor to it; raise `IdentificationError` with the known units if ``unit`` is unknown."""
-    unit = unit.strip()
-    known = UNITS.get(_SPELLINGS.get(unit, unit))
-    if known is None:
-        raise IdentificationError(f"is '{unit}'", where=where, allowed=UNITS)
-    return known
+    """Return the SI unit of a signal and the factor to it; raise `IdentificationError` with the usual units for others."""
+    found = _known(unit)
+    if found is None:
+        raise IdentificationError(f"is '{unit.strip()}'", where=where, allowed=UNITS)
+    return found.si, float(found.factor)

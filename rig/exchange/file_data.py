@@ -1,15 +1,18 @@
 """Content of a file of another program: the one form in which every reader returns it."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mapping import SIGNALS
 from vibrolock.arrays import Float
+from vibrolock.quantities import quantity
 
-_EVEN = 1e-3
-"""Relative difference of a step from the mean up to which instants are even; chosen: that of time stamps in milliseconds."""
+_IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]$")
+_IN_NAMES = (*SIGNALS, "s")
 
 Value = (
     None
@@ -29,7 +32,11 @@ Value = (
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelFacts:
-    """What a file says of one of its channels."""
+    """What a file says of one of its channels, in the words of its format.
+
+    Readers fill in what the file says and change no number; `rig.exchange.facts` uses all of it, in one place. A reader that
+    cannot follow what the file says puts that into ``unread``.
+    """
 
     name: str = ""
     """Name as the file has it; empty where it is the name of the value."""
@@ -45,6 +52,14 @@ class ChannelFacts:
     """Sample rate of this channel, Hz; None if the file gives none."""
     start_s: float | None = None
     """Time of the first sample, s; None if the file gives none."""
+    reversed: bool = False
+    """Whether the file says that the values count in the opposite direction."""
+    node: int | None = None
+    """Number of the node at which it was measured; None if the file gives none."""
+    direction: str = ""
+    """Direction at the node, such as ``+Z``; empty if the file gives none."""
+    unread: str = ""
+    """What the file says of this channel that cannot be followed, in words; a mapping that takes the channel is refused."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,20 +73,19 @@ class FileData:
     sample_rate_hz: float | None = None
     """Sample rate of all channels, Hz; None if the file gives none."""
 
-    def unit(self, path: str) -> str:
-        """Return the unit that the file gives for a value; empty if it gives none."""
-        return self.channels[path].unit if path in self.channels else ""
+    begins_s: float | None = None
+    """Instant from which the start times of the channels count, s since 1970 (UTC); None if the file gives none."""
 
-    def for_mapping(self) -> dict[str, object]:
-        """Return the values with the facts on sampling, as `identification` maps them."""
-        out: dict[str, object] = dict(self.values)
-        if self.sample_rate_hz is not None:
-            out["sample_rate_hz"] = self.sample_rate_hz
-        if any(channel.in_si for channel in self.channels.values()):
-            out["units"] = {name: channel.unit for name, channel in self.channels.items()}
-        rates = {name: one.sample_rate_hz for name, one in self.channels.items() if one.sample_rate_hz is not None}
-        starts = {name: one.start_s for name, one in self.channels.items() if one.start_s is not None}
-        return out | ({"__rates_hz__": rates} if rates else {}) | ({"__starts_s__": starts} if starts else {})
+    def facts(self, path: str) -> ChannelFacts:
+        """Return what the file says of the channel at a path, which may be written with dots for the groups of the file."""
+        if path in self.channels:
+            return self.channels[path]
+        whole = next((name for name in self.channels if "/" in name and name.replace("/", ".") == path), "")
+        return self.channels.get(whole) or ChannelFacts()
+
+    def unit(self, path: str) -> str:
+        """Return the unit that the file gives for a value, also in brackets at the end of its name; empty if it gives none."""
+        return self.facts(path).unit or unit_in_name(path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,11 +113,16 @@ def from_variables(values: dict[str, Value], units: Mapping[str, Value] | None =
     )
 
 
-def even_step(instants: Float) -> float | None:
-    """Return the time between evenly spaced instants, s; None if they are uneven or do not increase."""
-    steps = np.diff(instants)
-    step = float(steps.mean())
-    return step if step > 0.0 and np.all(np.abs(steps - step) <= _EVEN * step) else None
+def unit_in_name(name: str) -> str:
+    """Return a unit of a signal or of time in brackets at the end of a name, ``Force [N]``; empty without one."""
+    found = _IN_BRACKETS.search(name)
+    known = quantity(found[1]) if found is not None else None
+    return found[1].strip() if found is not None and known is not None and known.si in _IN_NAMES else ""
+
+
+def without_unit(name: str) -> str:
+    """Return a name without a text in brackets at its end."""
+    return _IN_BRACKETS.sub("", name).strip() or name
 
 
 def side_by_side(records: Sequence[Float]) -> Float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 from rig.bench.configuration import read_toml, validated
 from rig.errors import ConfigurationError
 from rig.exchange.child_reading import NAMES, NOT_OURS, PROPOSAL, ImportFailed, read_in_child
+from rig.exchange.facts import for_mapping
 from rig.exchange.file_data import FileData, StoredObject
 from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.sources import format_of, read_data
@@ -147,35 +148,9 @@ def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> "Measur
 def _mapped(data: FileData, mapping: "BaseModel", files: Mapping[str, FileData]) -> "Measurement":
     from identification import TimeDataMapping
 
-    _check_units(data, mapping, files)
+    values, further = for_mapping(data, mapping, files)
     apply = next(apply for kind, apply in _kinds().values() if isinstance(mapping, kind))
-    further = [{name: one.for_mapping() for name, one in files.items()}] if isinstance(mapping, TimeDataMapping) else []
-    return apply(data.for_mapping(), mapping, *further)
-
-
-def _check_units(data: FileData, mapping: "BaseModel", files: Mapping[str, FileData]) -> None:
-    """Refuse units in a mapping that contradict those that the file itself gives for its values."""
-    import identification as i
-    from identification import IdentificationError
-    from identification.mapping import SampledChannel, si_of
-
-    if not isinstance(mapping, i.TimeDataMapping | i.HammerTestMapping | i.MultisineMapping | i.BackboneMapping):
-        return
-    for channel in mapping.channels:
-        file, scale = (channel.file, channel.scale) if isinstance(channel, SampledChannel) else ("", 1.0)
-        given = files.get(file, data).unit(channel.value) if isinstance(channel.value, str) else ""
-        if not given or scale != 1.0:
-            continue  # with a scale, the numbers are another quantity: volts of a sensor, for example
-        try:
-            known = si_of(given, channel.name)
-        except IdentificationError:
-            continue
-        if si_of(channel.unit, channel.name) != known:
-            raise ImportFailed(
-                f"the file's own units make it {given}; write that",
-                field=f"channels.{channel.name}.unit",
-                value=channel.unit,
-            )
+    return apply(values, mapping, *([further] if isinstance(mapping, TimeDataMapping) else []))
 
 
 def _response_matrix(values: Mapping[str, object], mapping: "i.MultisineMapping") -> "i.FrequencyResponseMatrix":

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from identification import IdentificationError
-from identification.mapping import si_of
+from identification.mapping import even_sampling, si_of
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.file_data import ChannelFacts, FileData, even_step, side_by_side
+from rig.exchange.file_data import ChannelFacts, FileData, side_by_side
 from rig.system.text_files import read_text
 from vibrolock.arrays import Float
 
@@ -80,23 +80,21 @@ def _rate(one: Mapping[str, object], number: int) -> float:
     if fs is None and time is None:
         raise ImportFailed(f"series[{number}].fs: is missing, and so is time; wanted is one of them")
     if fs is None:
-        step = _step(time, data)
-        if step is None:
+        fs = _rate_of(time, data)
+        if fs is None:
             raise ImportFailed(
                 f"series[{number}].time: allowed are evenly spaced instants that increase, one for each of the data"
             )
-        fs = 1.0 / step
     if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < _MAX_RATE_HZ:
         raise ImportFailed(field=f"series[{number}].fs", value=fs, allowed="a number above 0")
     return float(fs)
 
 
-def _step(time: object, data: Float) -> float | None:
-    """Return the time between samples, s; None if these are no instants of evenly spaced samples."""
+def _rate_of(time: object, data: Float) -> float | None:
+    """Return the sample rate, Hz; None if these are no instants of evenly spaced samples."""
     try:
         instants = np.asarray(time, np.float64)
     except (TypeError, ValueError, OverflowError):
         return None
-    if instants.shape != data.shape or not np.all(np.isfinite(instants)):
-        return None
-    return even_step(instants)
+    found = even_sampling(instants) if instants.shape == data.shape else None
+    return None if found is None else found.rate_hz

@@ -15,9 +15,7 @@ _RAW = getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
 @contextmanager
-def open_regular(
-    path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError
-) -> Iterator[BinaryIO]:
+def open_regular(path: Path, largest_bytes: int, error: type[RigError] = ConfigurationError) -> Iterator[BinaryIO]:
     """Open a regular file; raise ``error`` for another kind, more than ``largest_bytes``, or a failure."""
     try:
         descriptor = os.open(path, os.O_RDONLY | _AT_ONCE | _RAW)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.exchange.file_data import ChannelFacts, FileData, even_step
+from identification.mapping import even_sampling
+from rig.exchange.file_data import ChannelFacts, FileData
 
 if TYPE_CHECKING:
     from asammdf.blocks import v2_v3_blocks, v4_blocks
@@ -86,12 +87,13 @@ def read_mdf4(path: Path) -> FileData:
                 samples = np.asarray(signal.samples)
                 if samples.dtype.kind not in "biuf" or samples.ndim != 1 or samples.size < 2:
                     continue
-                step = even_step(signal.timestamps)
+                even = even_sampling(signal.timestamps)
                 facts = ChannelFacts(
                     name=channel.name,
                     unit=str(signal.unit or ""),
-                    sample_rate_hz=None if step is None else 1.0 / step,
-                    start_s=None if step is None else float(signal.timestamps[0]),
+                    sample_rate_hz=None if even is None else even.rate_hz,
+                    start_s=None if even is None else even.start_s,
+                    unread="" if even is not None else "is not evenly sampled; resample it",
                 )
                 called = channel.name if every.count(channel.name) == 1 else f"{channel.name}#{number}"
                 found[called] = samples, facts

@@ -1,6 +1,5 @@
 """Contents of a file of another program: arrays by path, single numbers, lists of structures."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
@@ -8,12 +7,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import IdentificationError
-from identification.mapping import si_of
-from rig.exchange.file_data import FileData, Value
+from rig.exchange.facts import meant
+from rig.exchange.file_data import FileData, Value, without_unit
 
 _NO_DATA = ("sample_rate_hz", "units")  # variables by which a file tells of its data
-_IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]+)[\])]$")
 _MAX_DEPTH = 8  # levels of structures that are listed; chosen
 _MAX_VALUES = 2000  # values that are listed; chosen
 
@@ -35,7 +32,7 @@ class Leaf:
     def name(self) -> str:
         """Last part of the path, without a unit in brackets."""
         last = self.path.rpartition("/")[2] if "/" in self.path else self.path.rpartition(".")[2]
-        return _IN_BRACKETS.sub("", last).strip() or self.path
+        return without_unit(last) or self.path
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,20 +56,24 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
     full_names = any("/" in key for key in data.values)
     top = {
         key: value
-        for key, value in data.values.items()
+        for key, value in meant(data).items()
         if key not in _NO_DATA and not key.startswith("__") and not (full_names and isinstance(value, dict))
     }
     records, inside = _list_of_structures(top)
     arrays: list[Leaf] = []
     single, others = dict[str, float](), dict[str, str]()
     for path, value in islice(_leaves(inside if records else top, "", 0), _MAX_VALUES):
+        if unread := data.facts(path).unread:
+            others[path] = unread
+            continue
         array = np.squeeze(np.asarray(value)) if isinstance(value, np.ndarray | np.generic | int | float) else None
         if array is None or array.dtype.kind not in "biuf":
             others[path] = _what(value)
         elif array.size == 1:
             single[path] = float(array)
         elif array.size:
-            arrays.append(Leaf(path, array, data.unit(path) or _unit_in(path), file))
+            arrays.append(Leaf(path, array, data.unit(path), file))
+    others |= {name: one.unread for name, one in data.channels.items() if one.unread and name not in data.values}
     return FileContents(tuple(arrays), single, others, records, _rate(data, [leaf.path for leaf in arrays]))
 
 
@@ -94,15 +95,6 @@ def _leaves(structure: Mapping[str, Value], above: str, depth: int) -> Iterator[
             yield from _leaves(value, path, depth + 1)
         elif path:
             yield path, value
-
-
-def _unit_in(path: str) -> str:
-    """Return a unit in brackets at the end of a name, if it is understood: ``Force [N]``."""
-    found = _IN_BRACKETS.search(path)
-    try:
-        return "" if found is None else found[1].strip() if si_of(found[1], path) else ""
-    except IdentificationError:
-        return ""
 
 
 def _what(value: Value) -> str:

@@ -11,8 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from identification import IdentificationError
-from identification.mapping import si_of
-from rig.exchange.file_data import even_step
+from identification.mapping import even_sampling, si_of
 from vibrolock.arrays import Float
 
 _RATES = re.compile(
@@ -49,7 +48,7 @@ def is_time(name: str, values: NDArray[np.generic]) -> bool:
     """Return whether an array is a vector of evenly spaced instants, by name and values."""
     if values.ndim != 1 or values.size < 3 or not _TIMES.match(name):
         return False
-    return even_step(values.astype(np.float64)) is not None
+    return even_sampling(values) is not None
 
 
 def role_of(name: str, unit: str) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mapping import CsvLayout
+from identification.mapping import CsvLayout, even_sampling
 from rig.exchange.child_reading import ImportFailed, read_in_child
 from rig.exchange.file_data import MappingText
 from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
@@ -15,6 +15,7 @@ from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_o
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
 from rig.exchange.tables.guess import guessed_layout
+from vibrolock.quantities import seconds_in
 
 _MIN_SAMPLES = 16  # samples of the shortest signal; chosen
 _MAX_CHANNELS = 16  # channels that are proposed; chosen
@@ -143,8 +144,8 @@ def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float |
     if found[0].rate_hz is not None:
         return found[0].rate_hz, "", ""
     if times:
-        steps = np.diff(times[0].values.astype(np.float64))
-        return float(1.0 / steps.mean()), "", times[0].path
+        even = even_sampling(times[0].values, seconds_in(times[0].unit) or 1.0)
+        return (None if even is None else even.rate_hz), "", times[0].path
     for contents in found:
         if (named := rate_in(contents.single)) is not None:
             return named[1], named[0], ""

@@ -186,7 +186,7 @@ BROKEN: dict[str, tuple[str, Callable[[Path], None], str, str]] = {
     "noise called TDMS": ("x.tdms", noise, "", r"is no TDMS file, or a damaged one"),
     "noise called MDF": ("x.mf4", noise, "", r"is no MDF 4 file, or a damaged one"),
     "MDF of version 3": ("x.mf4", old_mdf, "", r"it is of MDF version 3\.30, allowed is 4"),
-    "MDF without a rate": ("x.mf4", uneven, "", r"`sample_rate_hz`: is missing; give it, or time"),
+    "MDF without a rate": ("x.mf4", uneven, "", r"`channels\.force`: 'F' is not evenly sampled; resample it"),
     "MDF at two rates": (
         "x.mf4",
         at_two_rates,
