@@ -15,7 +15,8 @@ from session_pb2 import Session
 from rig.emulator.nidaqmx.errors import NiError
 from rig.emulator.nidaqmx.facts import Facts
 from rig.emulator.nidaqmx.faults import Injection
-from rig.emulator.nidaqmx.tasks import Task, Tasks, Value
+from rig.emulator.nidaqmx.task import Task, Value
+from rig.emulator.nidaqmx.tasks import Tasks
 
 SERVICE = ni.DESCRIPTOR.services_by_name["NiDAQmx"]
 """NI's service with all its calls."""
@@ -250,7 +251,7 @@ class Calls(grpc.GenericRpcHandler):  # type: ignore[misc]
         task, n = self._task(request), request.num_samps_per_chan
         if n * len(task.channels) > request.array_size_in_samps:
             raise NiError(DAQmxErrors.READ_BUFFER_TOO_SMALL, f"{n} samples of {len(task.channels)} channels", read=0)
-        rows, error = self._tasks.read(task, n, request.timeout)
+        rows, error = self._tasks.buffers.read(task, n, request.timeout)
         by_channel = request.fill_mode_raw == FillMode.GROUP_BY_CHANNEL.value
         return ni.ReadAnalogF64Response(
             read_array=(rows if by_channel else rows.T).ravel().tolist(),
@@ -260,12 +261,12 @@ class Calls(grpc.GenericRpcHandler):  # type: ignore[misc]
 
     def _write(self, request: ni.WriteAnalogF64Request, _peer: str) -> ni.WriteAnalogF64Response:
         volts = np.array(request.write_array, float)
-        n = self._tasks.write(self._task(request), volts, request.timeout, auto_start=request.auto_start)
+        n = self._tasks.buffers.write(self._task(request), volts, request.timeout, auto_start=request.auto_start)
         return ni.WriteAnalogF64Response(samps_per_chan_written=n)
 
     def _write_scalar(self, request: ni.WriteAnalogScalarF64Request, _peer: str) -> ni.WriteAnalogScalarF64Response:
         volts = np.array([request.value])
-        self._tasks.write(self._task(request), volts, request.timeout, auto_start=request.auto_start)
+        self._tasks.buffers.write(self._task(request), volts, request.timeout, auto_start=request.auto_start)
         return ni.WriteAnalogScalarF64Response()
 
     # Watchdog
@@ -273,7 +274,7 @@ class Calls(grpc.GenericRpcHandler):  # type: ignore[misc]
     def _create_watchdog(
         self, request: ni.CreateWatchdogTimerTaskExRequest, peer: str
     ) -> ni.CreateWatchdogTimerTaskExResponse:
-        task = self._tasks.create_watchdog(request.session_name, peer, request.device_name, request.timeout)
+        task = self._tasks.watchdogs.create(request.session_name, peer, request.device_name, request.timeout)
         return ni.CreateWatchdogTimerTaskExResponse(task=Session(name=task.name), new_session_initialized=True)
 
     def _expiration_states(
@@ -283,5 +284,5 @@ class Calls(grpc.GenericRpcHandler):  # type: ignore[misc]
         return ni.CfgWatchdogAOExpirStatesResponse()
 
     def _control_watchdog(self, request: ni.ControlWatchdogTaskRequest, _peer: str) -> ni.ControlWatchdogTaskResponse:
-        self._tasks.control_watchdog(self._task(request), request.action_raw)
+        self._tasks.watchdogs.control(self._task(request), request.action_raw)
         return ni.ControlWatchdogTaskResponse()

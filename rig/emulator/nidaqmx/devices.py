@@ -11,6 +11,8 @@ SIMULTANEOUS_X_SERIES_HZ = 100e6
 DELTA_SIGMA_HZ = 13.1072e6 / 256
 """Largest rate of an NI-9234 with its internal master timebase, Hz; its rates are this over 1 to 31."""
 DELTA_SIGMA_DIVISORS = 31
+RANGE_MARGIN = 1.0 + 1e-9
+"""Rounding that a limit at the end of a range may have."""
 
 
 @dataclass(frozen=True)

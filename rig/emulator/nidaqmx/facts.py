@@ -12,9 +12,11 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 
 from rig.bench.channels import Channel
+from rig.emulator.nidaqmx.buffers import input_buffer
 from rig.emulator.nidaqmx.devices import Device
 from rig.emulator.nidaqmx.errors import NiError
-from rig.emulator.nidaqmx.tasks import DEFAULTS, Task, Tasks, Value
+from rig.emulator.nidaqmx.task import DEFAULTS, Task, Value
+from rig.emulator.nidaqmx.tasks import Tasks
 
 VERSION = {"NIDAQ_MAJOR_VERSION": 24, "NIDAQ_MINOR_VERSION": 8, "NIDAQ_UPDATE_VERSION": 0}
 """Version of NI-DAQmx that is reported; from 24.5 on the client asks fewer questions."""
@@ -201,7 +203,7 @@ class Facts:
             "DEVICES": ", ".join(device.name for device in task.devices),
             "NUM_CHANS": len(task.channels),
             "NUM_DEVICES": len(task.devices),
-            "INPUT_BUF_SIZE": tasks.input_buffer(task) if task.is_timed else 0,
+            "INPUT_BUF_SIZE": input_buffer(task) if task.is_timed else 0,
             "OUTPUT_BUF_SIZE": generation.size if generation is not None else 0,
             "INPUT_ONBRD_BUF_SIZE": 0,
             "OUTPUT_ONBRD_BUF_SIZE": next((d.outputs.onboard_samples for d in task.devices if d.outputs), 0),

@@ -72,7 +72,7 @@ class DeviceServer:
         while not self._ends.wait(TICK_S):
             with self.timeline.lock:
                 self.timeline.tick()
-                self.tasks.expire()
+                self.tasks.watchdogs.expire()
 
     def __exit__(self, *_: object) -> None:
         self._ends.set()

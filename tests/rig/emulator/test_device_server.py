@@ -134,7 +134,7 @@ def _passes(client, seconds):
         client.clock.now_s += seconds / steps
         with client.server.timeline.lock:
             client.server.timeline.advance()
-            client.server.tasks.expire()
+            client.server.tasks.watchdogs.expire()
 
 
 def _refused(code):
