@@ -5,16 +5,18 @@ A structure contains the arrays by name, ``units`` with the same names, ``channe
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.exchange.file_data import FileData, StoredObject, Value, from_variables
+from rig.exchange.file_data import ChannelFacts, FileData, StoredObject, Value, from_variables
 from rig.text.contents import Contents
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
+_MAX_DEPTH = 8  # levels of structures in which signals are looked for; chosen
 _MAX_NAME = 31  # most characters of a field name that every reader of version 5 accepts
 
 
@@ -66,13 +68,39 @@ def parsed_mat(path: Path) -> FileData:
     """Read a MAT file in this process, which may crash; the child process does. May raise any error."""
     from scipy.io import loadmat
 
-    from rig.exchange.foreign.matlab_hdf5 import read_matlab_hdf5
+    from rig.exchange.foreign.matlab_hdf5 import objects_in, read_matlab_hdf5
+    from rig.exchange.foreign.matlab_objects import opaque_in, read_objects
 
     try:
         variables: dict[str, Value] = loadmat(str(path), simplify_cells=True, appendmat=False)
+        objects = opaque_in(variables)
     except NotImplementedError:  # version 7.3
-        variables = read_matlab_hdf5(path)
-    return from_variables(variables)
+        variables, objects = read_matlab_hdf5(path), objects_in(path)
+    plain = {name: value for name, value in variables.items() if name not in objects}
+    facts = dict(signals_described(plain))
+    if objects:
+        values, told = read_objects(path, objects, plain)
+        plain, facts = {**plain, **values}, {**facts, **told}
+    found = from_variables(plain)
+    return replace(found, channels={**facts, **found.channels})
+
+
+def signals_described(value: Value, path: str = "", depth: int = 0) -> Iterator[tuple[str, ChannelFacts]]:
+    """Yield what structures with ``Data``, ``Name`` and ``Unit`` say of their data, by its path.
+
+    dSPACE ControlDesk writes them: a structure ``X`` of the instants and structures ``Y`` of the signals.
+    """
+    if depth > _MAX_DEPTH:
+        return
+    if isinstance(value, dict):
+        name, unit = (text if isinstance(text := value.get(key), str) else "" for key in ("Name", "Unit"))
+        if isinstance(value.get("Data"), np.ndarray) and (name or unit):
+            yield f"{path}.Data", ChannelFacts(name=name, unit=unit)
+        for key, item in value.items():
+            yield from signals_described(item, f"{path}.{key}" if path else key, depth + 1)
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1):
+        for index, item in enumerate(value):
+            yield from signals_described(item, f"{path}[{index}]", depth + 1)
 
 
 def stored_objects(data: FileData) -> list[StoredObject]:

@@ -1,5 +1,6 @@
 """Files of other programs, whatever their format, as mappings take them."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,10 +16,13 @@ FORMATS = {
     "mat": (".mat",),
     "uff": (".uff", ".unv", ".uf", ".bunv"),
     "csv": (".csv", ".txt", ".tsv"),
-    "hdf5": (".h5", ".hdf5", ".hdf", ".he5"),
+    "hdf5": (".h5", ".hdf5", ".hdf", ".he5", ".nc", ".nc4"),
     "wav": (".wav", ".wave"),
     "tdms": (".tdms",),
     "mdf4": (".mf4",),
+    "lvm": (".lvm",),
+    "npz": (".npz",),
+    "xlsx": (".xlsx", ".xlsm"),
     "sep005": (".json",),
 }
 """Formats that are read, with the suffixes that identify them."""
@@ -57,4 +61,5 @@ def read_data(path: Path, format_: str, *, units: str = "", layout: "CsvLayout |
         return data
     full = {**dict(in_full(data.values)), **data.values}  # values within groups also by full names, units by attributes
     given = {name: full.get(f"{name}@units", full.get(f"{name}@unit")) for name in full if "@" not in name}
-    return from_variables(full, given)
+    found = from_variables(full, given)
+    return replace(found, channels={**found.channels, **data.channels}, sample_rate_hz=data.sample_rate_hz)

@@ -1,9 +1,10 @@
-"""HDF5 files of any layout as nested dictionaries; ``name@attribute`` beside a name holds its attributes.
+"""HDF5 and NetCDF files of any layout as nested dictionaries; ``name@attribute`` beside a name holds its attributes.
 
 Links to other files, virtual and external datasets are not followed: a file from another program must not read other files.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from rig.exchange.child_values import TooMuchData, most_bytes
 from rig.exchange.file_data import FileData, Value, from_variables
+from rig.exchange.foreign.netcdf import MAGIC, of_rattlesnake, read_classic
 
 if TYPE_CHECKING:
     import h5py
@@ -44,8 +46,15 @@ def read_hdf5(path: Path) -> FileData:
     """Return the groups and datasets of a file; raise OSError, ValueError or errors of h5py if it cannot be read."""
     import h5py
 
+    with path.open("rb") as stream:
+        classic = stream.read(len(MAGIC)) == MAGIC
+    if classic:
+        return from_variables(read_classic(path))
     with h5py.File(path, "r") as file:
-        return from_variables({**dict(_attributes(file, "")), **_group(file, Budget(path), ())})
+        values = {**dict(_attributes(file, "")), **_group(file, Budget(path), ())}
+    values, channels, rate = of_rattlesnake(values)
+    found = from_variables(values)
+    return replace(found, channels={**found.channels, **channels}, sample_rate_hz=rate or found.sample_rate_hz)
 
 
 def _group(group: "h5py.Group", budget: Budget, above: "tuple[h5py.h5g.GroupID, ...]") -> dict[str, Value]:

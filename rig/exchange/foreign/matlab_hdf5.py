@@ -16,6 +16,9 @@ from rig.exchange.foreign.hdf5 import MAX_DEPTH, Budget, is_link_out
 if TYPE_CHECKING:
     import h5py
 
+_DECODED = "MATLAB_object_decode"
+"""Attribute of an object, whose numbers are references into a part of the file that MATLAB does not document."""
+
 
 def read_matlab_hdf5(path: Path) -> dict[str, Value]:
     """Return the variables of a file; raise OSError, ValueError or errors of h5py if it cannot be read."""
@@ -25,6 +28,20 @@ def read_matlab_hdf5(path: Path) -> dict[str, Value]:
         reader = _Reader(file, Budget(path))
         names = [name for name in file if not name.startswith("#") and not is_link_out(file, name)]
         return {name: reader.value(file[name], 0) for name in names}
+
+
+def objects_in(path: Path) -> dict[str, str]:
+    """Return the names of the variables that are objects of MATLAB, and their classes."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        names = [name for name in file if not name.startswith("#") and not is_link_out(file, name)]
+        return {name: _class(file[name]) for name in names if _DECODED in file[name].attrs}
+
+
+def _class(item: "h5py.Group | h5py.Dataset") -> str:
+    kind = item.attrs.get("MATLAB_class", b"")
+    return kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
 
 
 class _Reader:
@@ -43,8 +60,9 @@ class _Reader:
             return self._structure(item, depth)
         if item.is_virtual or item.external:
             return "<data in another file>"
-        kind = item.attrs.get("MATLAB_class", b"")
-        kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+        kind = _class(item)
+        if _DECODED in item.attrs:
+            return f"<MATLAB {kind}>"
         if item.shape is None or item.attrs.get("MATLAB_empty", 0):
             return "" if kind == "char" else np.zeros(0)
         self._budget.spend(int(np.prod(item.shape, dtype=float)) * item.dtype.itemsize)

@@ -27,10 +27,14 @@ class Leaf:
     """Unit that the file tells; empty if it tells none."""
     file: str = ""
     """Name of the file, if it is a further one."""
+    called: str = ""
+    """Name that the file gives in another place than the path; empty if it gives none."""
 
     @property
     def name(self) -> str:
-        """Last part of the path, without a unit in brackets."""
+        """Name that the file gives, or else the last part of the path, without a unit in brackets."""
+        if self.called:
+            return self.called
         last = self.path.rpartition("/")[2] if "/" in self.path else self.path.rpartition(".")[2]
         return without_unit(last) or self.path
 
@@ -49,6 +53,8 @@ class FileContents:
     """Path of the list of structures in which the arrays are; empty if there is none."""
     rate_hz: float | None = None
     """Sample rate that the file tells; None if it tells none."""
+    beside: "FileContents | None" = None
+    """What lies beside the list of structures; None without one."""
 
 
 def contents_of(data: FileData, file: str = "") -> FileContents:
@@ -72,9 +78,17 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
         elif array.size == 1:
             single[path] = float(array)
         elif array.size:
-            arrays.append(Leaf(path, array, data.unit(path), file))
+            facts = data.channels.get(path)
+            arrays.append(Leaf(path, array, data.unit(path), file, facts.name if facts else ""))
     others |= {name: one.unread for name, one in data.channels.items() if one.unread and name not in data.values}
-    return FileContents(tuple(arrays), single, others, records, _rate(data, [leaf.path for leaf in arrays]))
+    rate = _rate(data, [leaf.path for leaf in arrays])
+    beside = _beside(top, records) if records else None
+    return FileContents(tuple(arrays), single, others, records, rate, beside)
+
+
+def _beside(top: Mapping[str, Value], records: str) -> FileContents:
+    """Return the contents of a file beside its list of structures."""
+    return contents_of(FileData(values={key: value for key, value in top.items() if key != records}))
 
 
 def _list_of_structures(top: Mapping[str, Value]) -> tuple[str, Mapping[str, Value]]:
@@ -90,11 +104,23 @@ def _list_of_structures(top: Mapping[str, Value]) -> tuple[str, Mapping[str, Val
 
 def _leaves(structure: Mapping[str, Value], above: str, depth: int) -> Iterator[tuple[str, Value]]:
     for key, value in structure.items():
-        path = f"{above}.{key}" if above else str(key)
+        path = f"{above}{'' if key.startswith('[') else '.'}{key}" if above else str(key)
         if isinstance(value, dict) and depth + 1 < _MAX_DEPTH:
             yield from _leaves(value, path, depth + 1)
+        elif depth + 1 < _MAX_DEPTH and (entries := _entries(value)):
+            yield from _leaves({f"[{index}]": entry for index, entry in enumerate(entries)}, path, depth + 1)
         elif path:
             yield path, value
+
+
+def _entries(value: Value) -> list[Value]:
+    """Return the entries of a list of structures or arrays; none for anything else."""
+    if not isinstance(value, list) and not (
+        isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1
+    ):
+        return []
+    entries: list[Value] = list(value)
+    return entries if all(isinstance(one, dict | np.ndarray) for one in entries) else []
 
 
 def _what(value: Value) -> str:

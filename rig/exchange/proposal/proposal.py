@@ -147,7 +147,8 @@ def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float |
         even = even_sampling(times[0].values, seconds_in(times[0].unit) or 1.0)
         return (None if even is None else even.rate_hz), "", times[0].path
     for contents in found:
-        if (named := rate_in(contents.single)) is not None:
+        beside = contents.beside.single if contents.beside is not None else {}
+        if (named := rate_in({**contents.single, **beside})) is not None:
             return named[1], named[0], ""
     return None, "", ""
 

@@ -93,7 +93,7 @@ def text_of(
 
 def _listed(found: Sequence[FileContents]) -> Iterator[str]:
     listed: list[tuple[str, str]] = []
-    for contents in found:
+    for contents in [*found, *(one.beside for one in found if one.beside is not None)]:
         before = f"{contents.records}[...]." if contents.records else ""
         for leaf in contents.arrays:
             shape = " x ".join(map(str, leaf.values.shape))

@@ -41,8 +41,10 @@ def heading_of(lines: Lines, layout: CsvLayout) -> Heading | None:
     units: dict[str, str] = {}
     for at, (number, line) in enumerate(lines[len(above) :], len(above)):
         cells = [cell.strip() for cell in cells_of(line, separator)]
-        if _is_units(cells, plain):
-            units |= {name: cell for name, cell in zip(names, cells, strict=False) if cell and not units.get(name)}
+        if is_units(cells, layout.decimal):
+            units |= {
+                name: unit for name, unit in zip(names, map(_unit, cells), strict=False) if unit and name not in units
+            }
             above.append(line)
             continue
         columns = Columns(
@@ -71,13 +73,19 @@ def _separator(line: str, decimal: str) -> str:
     return max(";\t" if decimal == "," else ",;\t", key=line.count)
 
 
-def _is_units(cells: Sequence[str], columns: Columns) -> bool:
+def is_units(cells: Sequence[str], decimal: str = ".") -> bool:
     """Return whether a row holds units: texts that do not begin like a number, or a 1."""
-    values = [columns.number(cell) for cell in cells]
+    plain = Columns((), "", decimal)
+    values = [plain.number(cell) for cell in cells]
     return None in values and all(
         cell == "1" if value is not None else not _DIGIT_FIRST.match(cell)
         for cell, value in zip(cells, values, strict=True)
     )
+
+
+def _unit(cell: str) -> str:
+    """Return a unit without brackets around it."""
+    return cell[1:-1].strip() if (cell[:1], cell[-1:]) in (("[", "]"), ("(", ")")) else cell
 
 
 def _texts(columns: Columns, rows: Sequence[Sequence[str]]) -> frozenset[int]:
