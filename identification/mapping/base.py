@@ -23,12 +23,14 @@ NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 def value_at(data: Any, path: str, where: str) -> Any:
-    """Return the value at ``path`` (``a.b[2].c``) in ``data``.
+    """Return the value at ``path`` (``a.b[2].c``) in ``data``; ``.`` is ``data`` itself, an entry of a list of arrays.
 
     If the path does not exist, raises `IdentificationError` with ``where`` and the names that exist.
     """
     if isinstance(data, Mapping) and path in data:
         return data[path]  # a name that itself contains dots or brackets
+    if path == ".":
+        return data
     if not _PATH.fullmatch(path):
         reason = f"{where}: '{path}' is no path; write names joined by dots, with [0] for list entries"
         raise IdentificationError(reason)

@@ -1,6 +1,6 @@
 """Contents of a file of another program: arrays by path, single numbers, lists of structures."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
@@ -65,7 +65,7 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
         for key, value in meant(data).items()
         if key not in _NO_DATA and not key.startswith("__") and not (full_names and isinstance(value, dict))
     }
-    records, inside = _list_of_structures(top)
+    records, inside = _list_of_records(top, data.channels)
     arrays: list[Leaf] = []
     single, others = dict[str, float](), dict[str, str]()
     for path, value in islice(_leaves(inside if records else top, "", 0), _MAX_VALUES):
@@ -79,7 +79,8 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
             single[path] = float(array)
         elif array.size:
             facts = data.channels.get(path)
-            arrays.append(Leaf(path, array, data.unit(path), file, facts.name if facts else ""))
+            called = records.rpartition(".")[2] if path == "." else facts.name if facts else ""
+            arrays.append(Leaf(path, array, data.unit(path), file, called))
     others |= {name: one.unread for name, one in data.channels.items() if one.unread and name not in data.values}
     rate = _rate(data, [leaf.path for leaf in arrays])
     beside = _beside(top, records) if records else None
@@ -87,19 +88,45 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
 
 
 def _beside(top: Mapping[str, Value], records: str) -> FileContents:
-    """Return the contents of a file beside its list of structures."""
-    return contents_of(FileData(values={key: value for key, value in top.items() if key != records}))
+    """Return the contents of a file beside its list of records."""
+
+    def without(group: Mapping[str, Value], above: str) -> dict[str, Value]:
+        paths = {key: f"{above}.{key}" if above else key for key in group}
+        kept = {key: value for key, value in group.items() if paths[key] != records}
+        return {key: without(value, paths[key]) if isinstance(value, dict) else value for key, value in kept.items()}
+
+    return contents_of(FileData(values=without(top, "")))
 
 
-def _list_of_structures(top: Mapping[str, Value]) -> tuple[str, Mapping[str, Value]]:
-    """Return path and first entry of a list of structures that holds the only arrays of a file, or an empty path."""
-    for key, value in top.items():
-        numbers = isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
-        entries = list(value) if isinstance(value, list | np.ndarray) and not numbers else []
-        structures = [entry for entry in entries if isinstance(entry, dict)]
-        if entries and len(structures) == len(entries):
-            return key, structures[0]
+def _list_of_records(
+    group: Mapping[str, Value], described: Collection[str], above: str = "", depth: int = 0
+) -> tuple[str, Mapping[str, Value]]:
+    """Return path and first entry of a list of structures or of arrays, one for each record, or an empty path.
+
+    A list of signals is none: the file describes each, by its path in ``described``.
+    """
+    for key, value in group.items():
+        path = f"{above}.{key}" if above else key
+        if isinstance(value, dict):
+            inside = _list_of_records(value, described, path, depth + 1) if depth + 1 < _MAX_DEPTH else ("", {})
+            if inside[0]:
+                return inside
+            continue
+        entries = [] if any(one.startswith(f"{path}[") for one in described) else _entries(value)
+        first = entries[0] if entries else None
+        if isinstance(first, dict) and all(isinstance(entry, dict) for entry in entries):
+            return path, first
+        elif len(entries) > 1 and all(_is_long(entry) and _width(entry) == _width(first) for entry in entries):
+            return path, {".": first}
     return "", {}
+
+
+def _is_long(value: Value) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "biuf" and value.size > 2
+
+
+def _width(value: Value) -> tuple[int, ...]:
+    return np.shape(value)[1:]
 
 
 def _leaves(structure: Mapping[str, Value], above: str, depth: int) -> Iterator[tuple[str, Value]]:
