@@ -8,10 +8,13 @@ from typing import Any
 import h5py
 import hdf5storage
 import numpy as np
+import openpyxl
+import pandas as pd
 import pyuff
 import scipy.io
 import soundfile
 from asammdf import MDF, Signal
+from matio import save_to_mat
 from nptdms import ChannelObject, TdmsWriter
 
 RATE_HZ = 2048.0
@@ -112,6 +115,54 @@ def sep005(path: Path) -> None:
     path.write_text(json.dumps(plain))
 
 
+def lvm(path: Path) -> None:
+    head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t,\n"
+    head += "X_Columns\tOne\n***End_of_Header***\t\n\t\n"
+    about = {"Channels": ["2", ""], "Samples": [N, N], "Y_Unit_Label": ["N", "g"], "X0": ["0,0E+0"] * 2}
+    about["Delta_X"] = [f"{1.0 / RATE_HZ:.17g}".replace(".", ",")] * 2
+    lines = ["\t".join([key, *map(str, values), ""]) for key, values in about.items()]
+    lines += ["***End_of_Header***\t\t\t", "X_Value\tForce\tAcc\tComment"]
+    columns = zip(INSTANTS, FORCE, ACCELERATION / GRAVITY, strict=True)
+    lines += [f"{t:.6f}\t{f:.17g}\t{a:.17g}".replace(".", ",") for t, f, a in columns]
+    path.write_text(head + "\n".join(lines) + "\n", newline="\r\n", encoding="utf-8")
+
+
+def npz(path: Path) -> None:
+    np.savez_compressed(path, F=FORCE, a=ACCELERATION / GRAVITY, F_unit="N", a_unit="g", fs=RATE_HZ)
+
+
+def xlsx(path: Path) -> None:
+    book = openpyxl.Workbook()
+    for row in (["Recorder 1.2"], ["time", "F", "a"], ["s", "N", "g"]):
+        book.active.append(row)
+    for row in np.c_[INSTANTS, FORCE, ACCELERATION / GRAVITY].tolist():
+        book.active.append(row)
+    book.save(path)
+
+
+def rattlesnake(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file["time_data"] = np.stack([FORCE, ACCELERATION / GRAVITY])
+        file.attrs["sample_rate"] = int(RATE_HZ)
+        for name, texts in {"unit": ["N", "g"], "node_number": ["7", "7"], "node_direction": ["Z+", "Z+"]}.items():
+            file.create_dataset(f"channels/{name}", data=texts, dtype=h5py.string_dtype())
+
+
+def classic(path: Path) -> None:
+    with scipy.io.netcdf_file(path, "w") as file:
+        file.createDimension("sample", N)
+        file.sample_rate = RATE_HZ
+        for name, values, unit in (("F", FORCE, "N"), ("a", ACCELERATION / GRAVITY, "g")):
+            variable = file.createVariable(name, "f8", ("sample",))
+            variable[:], variable.units = values, unit
+
+
+def timetable(path: Path) -> None:
+    index = pd.to_timedelta(np.round(INSTANTS * 1e9).astype(np.int64), unit="ns")
+    table = pd.DataFrame({"F": FORCE, "a": ACCELERATION / GRAVITY}, index=index.rename("Time"))
+    save_to_mat(str(path), {"data": table, "fs": RATE_HZ}, version="v7")
+
+
 FILES: dict[str, tuple[Callable[[Path], None], str, str]] = {
     "v4.mat": (mat4, "F", "a"),
     "v5.mat": (mat5, "test.F", "test.a"),
@@ -124,5 +175,11 @@ FILES: dict[str, tuple[Callable[[Path], None], str, str]] = {
     "labview.tdms": (tdms, "Daq/Force", "Daq/Acc.1"),
     "car.mf4": (mdf4, "Force", "Acc"),
     "series.json": (sep005, "F", "a"),
+    "labview.lvm": (lvm, "Force", "Acc"),
+    "archive.npz": (npz, "F", "a"),
+    "book.xlsx": (xlsx, "F", "a"),
+    "rattlesnake.nc4": (rattlesnake, "time_data[0]", "time_data[1]"),
+    "classic.nc": (classic, "F", "a"),
+    "timetable.mat": (timetable, "data.F", "data.a"),
 }
 """By name: who writes the file, and the paths of force and acceleration in it."""

@@ -21,6 +21,10 @@ EXTRA = {
     "comma.txt": f"""sample_rate_hz = {RATE_HZ}
 csv = {{ skip_lines = 2, names = ["column1", "column2"], separator = "\\t", decimal = "," }}""",
     "lab.h5": f"sample_rate_hz = {RATE_HZ}",
+    "archive.npz": f"sample_rate_hz = {RATE_HZ}",
+    "book.xlsx": 'time = "time"',
+    "classic.nc": f"sample_rate_hz = {RATE_HZ}",
+    "timetable.mat": f"sample_rate_hz = {RATE_HZ}",
 }
 
 
