@@ -18,6 +18,7 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import SettleRule
 
 DELAY_RESERVE = 1.5  # of the delay at which the gains must still be stable
+HUNTING_PERIODS = 0.75  # of delay, with which the paper's controller hunts on the magnet beam
 DELAY_STEP = 1.25  # between delays that are tried
 BISECTIONS = 5  # of the last step: to a percent
 
@@ -122,6 +123,16 @@ class LockedPlan(Levels, Plan):
                 allowed=f"up to {1000.0 * longest_s:.3g} ms: shorter blocks or queue, smaller gains, or those that `rig "
                 "tune` finds with this delay",
             )
+
+    def remark_on_delay(self, bench: Bench, loop_delay_s: float) -> str:
+        """Say so where gains that no plant has proven meet a delay with which the paper's controller hunts."""
+        periods = loop_delay_s * bench.specimen.linear_frequency_hz
+        if self.plant is not None or periods < HUNTING_PERIODS:
+            return ""
+        return (
+            f"the loop's delay of {1000.0 * loop_delay_s:.3g} ms is {periods:.2g} periods of the specimen, and the plan has no "
+            "[plant] on which its gains could be checked: points may never settle; `rig tune` makes gains for this delay"
+        )
 
     def _check_plant(self, bench: Bench) -> None:
         """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels beyond its reach."""

@@ -211,6 +211,10 @@ class Plan(Configured):
         except ValueError as error:
             raise ConfigurationError.of(error, within="controller") from None
 
+    def remark_on_delay(self, bench: Bench, loop_delay_s: float) -> str:
+        """Return a line for the person who runs the test, if the delay (s) may be too long for the gains; else nothing."""
+        return ""
+
 
 class OpenLoopPlan(Plan):
     """Base of the plans without phase feedback: the plan prescribes the frequency."""

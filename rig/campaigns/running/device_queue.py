@@ -35,7 +35,10 @@ def settled_queue(plan: Plan, bench: Bench, session: Session, options: RunOption
     if choice is not None:
         if choice.remark:
             options.progress.remark(choice.remark)
-        plan.check_delay(bench, bench.block + choice.latency_samples)
+        delay_samples = bench.block + choice.latency_samples
+        plan.check_delay(bench, delay_samples)
+        if late := plan.remark_on_delay(bench, delay_samples / bench.sample_rate_hz):
+            options.progress.remark(late)
     return choice
 
 

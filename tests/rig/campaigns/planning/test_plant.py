@@ -335,6 +335,16 @@ def test_without_a_plant_the_bound_of_the_gains_holds():
         plan.check_delay(bench, 1.001 * longest_s * bench.sample_rate_hz)
 
 
+@pytest.mark.parametrize(("periods", "said"), [(0.5, False), (0.74, False), (0.76, True), (2.5, True)])
+def test_a_delay_with_which_a_loop_may_hunt_is_told_where_no_plant_proves_the_gains(periods, said):
+    plan, bench = load_plan("magnet-beam/backbone"), load_bench("magnet-beam")
+    delay_s = periods / bench.specimen.linear_frequency_hz
+    remark = plan.remark_on_delay(bench, delay_s)
+    assert (f"is {periods:.2g} periods of the specimen" in remark) is said
+    assert bool(remark) is said
+    assert plan_for("magnet-beam")[0].remark_on_delay(bench, delay_s) == ""
+
+
 def test_the_harmonics_loop_is_judged_at_the_delay_of_the_device():
     plan = load_plan("friction-beam/backbone-pure")
     bench = load_bench(plan.bench)
