@@ -80,12 +80,15 @@ def test_it_does_not_use_the_product():
 def test_outputs_are_read_back_at_the_index_they_were_meant_for(port, block):
     rng = np.random.default_rng(block)
     volts = np.round(rng.uniform(-9.0, 9.0, (400 // block, block)), 3)
-    inputs, flags = [], []
-    with make_daq(bench_at(port)) as daq:
-        daq.start(block)
-        for one in volts:
-            inputs.append(daq.exchange(one.copy()))
-            flags.append(daq.flags.copy())
+    for _ in range(20):  # a busy machine may be late with all of them
+        inputs, flags = [], []
+        with make_daq(bench_at(port)) as daq:
+            daq.start(block)
+            for one in volts:
+                inputs.append(daq.exchange(one.copy()))
+                flags.append(daq.flags.copy())
+        if np.vstack(inputs)[:, 0].any():
+            break
     driven, clean = np.vstack(inputs)[QUEUE * block :], np.concatenate(flags)[QUEUE * block :] == 0
     expected = volts.ravel()[: len(driven)]
     assert not np.vstack(inputs)[: QUEUE * block].any()
