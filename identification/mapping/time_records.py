@@ -57,6 +57,8 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         reason = f"records have rates from {rate:g} Hz on"
         raise IdentificationError(reason, field="sample_rate_hz", hint="wanted is one")
     cut, notes = _cut(raw, mapping, rate)
+    if rounded_s := max(one.rounded_s for one in raw):
+        notes = (f"the instants are rounded by up to {rounded_s:.2g} s; {rate:.10g} Hz was taken", *notes)
     channels, _ = in_si(mapping.channels)
     forces = [row for row, channel in enumerate(channels) if channel.role == "force"]
     force, unit = forces[:1], channels[forces[0]].unit if forces else ""
@@ -98,6 +100,7 @@ class _Raw:
     group: int
     period_samples: int
     level: float | None = None
+    rounded_s: float = 0.0
 
 
 def _raw_records(
@@ -105,7 +108,7 @@ def _raw_records(
 ) -> list[_Raw]:
     """Return the records in one structure: all channels side by side, on one grid of instants."""
     _, factors = in_si(mapping.channels)
-    found, told, starts = [], {"sample_rate_hz": mapping.sample_rate_hz}, []
+    found, told, starts, rounded_s = [], {"sample_rate_hz": mapping.sample_rate_hz}, [], 0.0
     for channel, factor in zip(mapping.channels, factors, strict=True):
         label = f"{where}channels.{channel.name}"
         stored = series(
@@ -113,9 +116,10 @@ def _raw_records(
         )
         offset = 0.0 if channel.offset == "mean" else channel.offset
         found.append(replace(stored, values=(stored.values - offset) * (channel.scale * factor)))
-        rates, start = _sampling(entries[channel.file], files[channel.file], mapping, channel)
+        rates, start, rounded = _sampling(entries[channel.file], files[channel.file], mapping, channel)
         told |= rates
         starts.append(start)
+        rounded_s = max(rounded_s, rounded)
     rate = common_rate_hz(told)
     skipped = _skipped(mapping.channels, starts, rate)
     periods = {one.period_samples for one in found} - {0}
@@ -131,15 +135,19 @@ def _raw_records(
     )
     size = next(iter(periods), mapping.period_samples or 0)
     levels, realisations = together.shape[1:3]
-    return [_Raw(together[:, level, one], rate, level, size) for level in range(levels) for one in range(realisations)]
+    return [
+        _Raw(together[:, level, one], rate, level, size, rounded_s=rounded_s)
+        for level in range(levels)
+        for one in range(realisations)
+    ]
 
 
 def _sampling(
     entry: Any, file: Any, mapping: TimeDataMapping, channel: SampledChannel
-) -> tuple[dict[str, float | None], float]:
-    """Return the sample rates that are told of a channel, by where they are from, and the time of its first sample."""
+) -> tuple[dict[str, float | None], float, float]:
+    """Return the sample rates told of a channel, by where they are from, its first instant, and the rounding of instants, s."""
     told: dict[str, float | None] = {}
-    start = 0.0
+    start = rounded_s = 0.0
     of_file = channel.file or "file"
     if isinstance(file, Mapping):
         told[of_file] = rate_of_file_hz(file)
@@ -152,7 +160,8 @@ def _sampling(
         wanted = next((rate for rate in (mapping.sample_rate_hz, *told.values()) if rate is not None), None)
         found = instants_at(entry, mapping.time, seconds_of_time(file, mapping.time_unit), wanted)
         told[f"time{' of ' if channel.file else ''}{channel.file}"], start = found.rate_hz, found.start_s
-    return told, start
+        rounded_s = found.rounded_s
+    return told, start, rounded_s
 
 
 def _holds(entry: Any, path: str, *, alone: bool) -> bool:
@@ -172,7 +181,8 @@ def _skipped(channels: Sequence[SampledChannel], starts: Sequence[float], rate_h
     for channel, samples in zip(channels, late, strict=True):
         if abs(samples - round(samples)) > _WHOLE:
             reason = f"begins {samples:.2f} samples before another"
-            raise IdentificationError(reason, field=f"channels.{channel.name}", allowed="whole samples, resample it")
+            hint = "resample it, or say `against_file = true` at the top if the start times are wrong"
+            raise IdentificationError(reason, field=f"channels.{channel.name}", allowed="whole samples", hint=hint)
     return [round(samples) + channel.start_samples for channel, samples in zip(channels, late, strict=True)]
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rig.errors import ConfigurationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.file_data import FileData, from_variables, in_full
+from rig.exchange.foreign.attributes import facts_of_attributes
 from rig.exchange.uff.reading import read_uff, time_data_in
 
 if TYPE_CHECKING:
@@ -60,6 +61,6 @@ def read_data(path: Path, format_: str, *, units: str = "", layout: "CsvLayout |
     if format_ != "hdf5":
         return data
     full = {**dict(in_full(data.values)), **data.values}  # values within groups also by full names, units by attributes
-    given = {name: full.get(f"{name}@units", full.get(f"{name}@unit")) for name in full if "@" not in name}
-    found = from_variables(full, given)
-    return replace(found, channels={**found.channels, **data.channels}, sample_rate_hz=data.sample_rate_hz)
+    found = from_variables(full)
+    channels = {**found.channels, **facts_of_attributes(full), **data.channels}
+    return replace(found, channels=channels, sample_rate_hz=data.sample_rate_hz)

@@ -3,7 +3,11 @@
 Every reader raises errors of its package, or ValueError, if a file cannot be read, and ImportError without its package.
 """
 
+import re
 import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,12 +16,20 @@ from numpy.typing import NDArray
 
 from identification.mapping import even_sampling
 from rig.exchange.file_data import ChannelFacts, FileData
+from vibrolock.quantities import says_a_unit, seconds_in
 
 if TYPE_CHECKING:
+    from asammdf import Signal
     from asammdf.blocks import v2_v3_blocks, v4_blocks
 
     Channel = v2_v3_blocks.Channel | v4_blocks.Channel
 
+_SCALE_KIND = re.compile(r"NI_Scale\[\d+\]_Scale_Type$")
+_SCALES = (
+    *("Polynomial", "Linear", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI"),
+)
+"""Kinds of scales that npTDMS applies (version 1.13)."""
+_FROM_1904_S = 2_082_844_800  # from the origin of time stamps of TDMS, 1904, to 1970
 _FORMULA = 3  # type of a conversion by a formula (ASAM MDF 4.1, block CC)
 Found = dict[str, tuple[NDArray[np.generic], ChannelFacts]]
 """Values and facts of channels by name."""
@@ -48,21 +60,60 @@ def read_tdms(path: Path) -> FileData:
     from nptdms import TdmsFile
 
     found: Found = {}
-    with TdmsFile.open(path) as file:
+    begins: dict[str, Fraction] = {}
+    with TdmsFile.open(path, raw_timestamps=True) as file:
         for channel in (channel for group in file.groups() for channel in group.channels()):
             if np.dtype(channel.dtype).kind not in "biuf" or not len(channel):
                 continue
-            properties = channel.properties
-            step, start = properties.get("wf_increment"), properties.get("wf_start_offset")
-            unit = properties.get("unit_string") or properties.get("NI_UnitDescription")
-            facts = ChannelFacts(
-                name=str(channel.name),
-                unit=unit if isinstance(unit, str) else "",
-                sample_rate_hz=1.0 / step if isinstance(step, float) and step > 0.0 else None,
-                start_s=start if isinstance(start, float) else None,
-            )
-            found[f"{channel.group_name}/{channel.name}"] = np.asarray(channel[:]), facts
-    return _data(found)
+            full = f"{channel.group_name}/{channel.name}"
+            every = (channel.properties, file[channel.group_name].properties, file.properties)
+            found[full] = np.asarray(channel[:]), _facts_of_tdms(str(channel.name), every)
+            if (begin := _instant(channel.properties.get("wf_start_time"))) is not None:
+                begins[full] = begin
+    first = min(begins.values(), default=Fraction(0))
+    later = {name: float(begin - first) for name, begin in begins.items()}
+    lined_up = {
+        name: (values, replace(facts, start_s=(facts.start_s or 0.0) + later[name]) if name in later else facts)
+        for name, (values, facts) in found.items()
+    }
+    return replace(_data(lined_up), begins_s=float(first) if begins else None)
+
+
+def _facts_of_tdms(name: str, every: Sequence[Mapping[str, object]]) -> ChannelFacts:
+    """Return what the properties of a channel say, and those of its group and file of its scales."""
+    properties = every[0]
+    step, start = properties.get("wf_increment"), properties.get("wf_start_offset")
+    unit = properties.get("unit_string") or properties.get("NI_UnitDescription")
+    of_time = properties.get("wf_xunit_string")
+    seconds = seconds_in(of_time) if isinstance(of_time, str) and says_a_unit(of_time) else 1.0
+    known = isinstance(step, float) and step > 0.0 and seconds is not None
+    remarks = (
+        [] if seconds is not None or step is None else [f"has a waveform over {of_time}, which is no unit of time"]
+    )
+    remarks += [f"is scaled by {kind}, which npTDMS does not know" for kind in _unknown_scales(every)]
+    return ChannelFacts(
+        name=name,
+        unit=unit if isinstance(unit, str) else "",
+        sample_rate_hz=1.0 / (step * seconds) if isinstance(step, float) and known and seconds else None,
+        start_s=start * (seconds or 1.0) if isinstance(start, float) else None,
+        unread="; ".join(remarks),
+    )
+
+
+def _unknown_scales(every: Sequence[Mapping[str, object]]) -> Iterator[str]:
+    """Yield the kinds of scales that npTDMS leaves out: of the first of channel, group and file that has any."""
+    for properties in every:
+        kinds = [str(kind) for key, kind in properties.items() if _SCALE_KIND.match(key)]
+        if kinds:
+            unscaled = properties.get("NI_Scaling_Status", "unscaled") != "scaled"
+            yield from (kind for kind in kinds if unscaled and kind not in _SCALES)
+            return
+
+
+def _instant(value: object) -> Fraction | None:
+    """Return a time stamp of TDMS, s since 1970; None without one, or if it is at the origin of its clock: not set."""
+    seconds, parts = getattr(value, "seconds", 0), getattr(value, "second_fractions", 0)
+    return Fraction(int(seconds) - _FROM_1904_S) + Fraction(int(parts), 2**64) if seconds else None
 
 
 def read_mdf4(path: Path) -> FileData:
@@ -74,6 +125,7 @@ def read_mdf4(path: Path) -> FileData:
     from asammdf import MDF
 
     found: Found = {}
+    left_out: dict[str, ChannelFacts] = {}
     with MDF(path) as file:
         if not str(file.version).startswith("4"):
             raise ValueError(f"it is of MDF version {file.version}, allowed is 4")
@@ -81,23 +133,33 @@ def read_mdf4(path: Path) -> FileData:
         every = [channel.name for channels in groups for channel in channels]
         for number, channels in enumerate(groups):
             for index, channel in enumerate(channels):
-                if index == file.masters_db.get(number) or _by_formula(channel):
+                if index == file.masters_db.get(number):
+                    continue
+                called = channel.name if every.count(channel.name) == 1 else f"{channel.name}#{number}"
+                if _by_formula(channel):
+                    left_out[called] = ChannelFacts(unread="is converted by a formula, which is not evaluated")
                     continue
                 signal = file.get(channel.name, group=number, index=index, ignore_invalidation_bits=True)
                 samples = np.asarray(signal.samples)
-                if samples.dtype.kind not in "biuf" or samples.ndim != 1 or samples.size < 2:
-                    continue
-                even = even_sampling(signal.timestamps)
-                facts = ChannelFacts(
-                    name=channel.name,
-                    unit=str(signal.unit or ""),
-                    sample_rate_hz=None if even is None else even.rate_hz,
-                    start_s=None if even is None else even.start_s,
-                    unread="" if even is not None else "is not evenly sampled; resample it",
-                )
-                called = channel.name if every.count(channel.name) == 1 else f"{channel.name}#{number}"
-                found[called] = samples, facts
-    return _data(found)
+                if samples.dtype.kind in "biuf" and samples.ndim == 1 and samples.size >= 2:
+                    found[called] = samples, _facts_of_mdf(channel.name, signal)
+        begins_s = file.header.abs_time * 1e-9
+    data = _data(found)
+    return replace(data, channels=data.channels | left_out, begins_s=begins_s or None)
+
+
+def _facts_of_mdf(name: str, signal: "Signal") -> ChannelFacts:
+    even = even_sampling(signal.timestamps)
+    remarks = [] if even is not None else ["is not evenly sampled; resample it"]
+    if signal.invalidation_bits is not None and (invalid := int(np.count_nonzero(signal.invalidation_bits))):
+        remarks.append(f"has {invalid} samples that are marked as invalid")
+    return ChannelFacts(
+        name=name,
+        unit=str(signal.unit or ""),
+        sample_rate_hz=None if even is None else even.rate_hz,
+        start_s=None if even is None else even.start_s,
+        unread="; ".join(remarks),
+    )
 
 
 def _by_formula(channel: "Channel") -> bool:

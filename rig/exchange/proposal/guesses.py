@@ -13,15 +13,19 @@ from numpy.typing import NDArray
 from identification import IdentificationError
 from identification.mapping import even_sampling, si_of
 from vibrolock.arrays import Float
+from vibrolock.quantities import says_a_unit, seconds_in
 
 _RATES = re.compile(
     r"(f_?s|sr|sample_?rate(_?hz)?|sampling_?(rate|freq(uency)?)|rate(_hz)?|freq_?s(ample)?)$", re.IGNORECASE
 )
 _STEPS = re.compile(r"(dt|delta_?t|t_?s|sample_?time|wf_increment)$", re.IGNORECASE)
-_TIMES = re.compile(r"(t|time|times|time_?s|zeit)$", re.IGNORECASE)
+_TIMES = re.compile(
+    r"(t|x_value|.*(time|times|zeit|temps|tiempo)([_ ]?(stamps?|axis|vector|s|sec|ms|us))?)$", re.IGNORECASE
+)
 _FORCES = re.compile(r"(f|u|in|input|load)\d*$|.*(force|kraft|hammer|excit|impuls)", re.IGNORECASE)
 _VOLTAGES = re.compile(r"(ref|dac)\d*$|.*(volt|generator|source|command)", re.IGNORECASE)
 _MOTIONS = re.compile(r"[xyadv]\d*$|out|resp|.*(acc|beschl|vel|geschw|ldv|disp|defl|posit)", re.IGNORECASE)
+_RAMP = 16  # samples from which even steps are those of a clock; chosen
 _SAME_PERIOD = 0.02
 """Largest RMS difference of two periods relative to the signal."""
 _NOISES = 3.0
@@ -44,11 +48,22 @@ def rate_in(single: Mapping[str, float]) -> tuple[str, float] | None:
     return None
 
 
-def is_time(name: str, values: NDArray[np.generic]) -> bool:
-    """Return whether an array is a vector of evenly spaced instants, by name and values."""
-    if values.ndim != 1 or values.size < 3 or not _TIMES.match(name):
+def is_time(name: str, values: NDArray[np.generic], unit: str = "") -> bool:
+    """Return whether an array is a vector of instants, evenly spaced or not.
+
+    It never decreases, and its unit is one of time; or it has no unit, and a name of time, or even steps other than 1, which
+    no signal has.
+    """
+    if values.ndim != 1 or values.size < 3 or values.dtype.kind not in "iuf":
         return False
-    return even_sampling(values) is not None
+    if says_a_unit(unit) and seconds_in(unit) is None:
+        return False
+    steps = np.diff(values.astype(np.float64))
+    if not np.all(steps >= 0.0) or not np.any(steps > 0.0):
+        return False
+    if seconds_in(unit) is not None or _TIMES.match(name):
+        return True
+    return values.size >= _RAMP and not np.all(steps == 1.0) and even_sampling(values) is not None
 
 
 def role_of(name: str, unit: str) -> tuple[str, str]:

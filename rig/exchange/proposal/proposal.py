@@ -62,7 +62,7 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
     if not lengths:
         raise ImportFailed(f"{path}: holds no array of real numbers with {_MIN_SAMPLES} samples or more")
     samples = max(set(lengths), key=lambda length: (lengths.count(length), length))  # the commonest, then the largest
-    times = [leaf for leaf in arrays if is_time(leaf.name, leaf.values)]
+    times = [leaf for leaf in arrays if is_time(leaf.name, leaf.values, leaf.unit)]
     signals = [leaf for leaf in arrays if samples in leaf.values.shape and leaf not in times]
     if not signals:
         raise ImportFailed(f"{path}: holds no signals: arrays of {_MIN_SAMPLES} samples and more besides the time")
@@ -139,18 +139,18 @@ def _with_roles(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:
     return [channel.played(roles.get(number, channel.role)) for number, channel in enumerate(out)]
 
 
-def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float | None, str, str]:
-    """Return the sample rate, where it is from (empty: the file tells it), and the path of the instants, if these tell it."""
+def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float | None, str, Leaf | None]:
+    """Return the sample rate, where it is from (empty: the file tells it), and the instants, if these tell it."""
     if found[0].rate_hz is not None:
-        return found[0].rate_hz, "", ""
-    if times:
-        even = even_sampling(times[0].values, seconds_in(times[0].unit) or 1.0)
-        return (None if even is None else even.rate_hz), "", times[0].path
+        return found[0].rate_hz, "", None
+    for leaf in times:
+        if (even := even_sampling(leaf.values, seconds_in(leaf.unit) or 1.0)) is not None:
+            return even.rate_hz, "", leaf
     for contents in found:
         beside = contents.beside.single if contents.beside is not None else {}
         if (named := rate_in({**contents.single, **beside})) is not None:
-            return named[1], named[0], ""
-    return None, "", ""
+            return named[1], named[0], None
+    return None, "", None
 
 
 def _periods(

@@ -46,7 +46,7 @@ class Proposal:
     records: str
     rate_hz: float | None
     rate_from: str
-    time: str
+    time: Leaf | None
     period_samples: int
     transient_periods: int
     band_hz: tuple[float, float] | None
@@ -113,8 +113,9 @@ def _sampling(proposal: Proposal) -> Iterator[str]:
     if proposal.rate_hz is None:
         yield "# The file tells no sample rate. Fill it in:"
         yield "#sample_rate_hz ="
-    elif proposal.time:
-        yield f"time = {_quoted(proposal.time)}    # instants, s: {proposal.rate_hz:.8g} Hz"
+    elif proposal.time is not None:
+        unit = _one_line(proposal.time.unit) or "s"
+        yield f"time = {_quoted(proposal.time.path)}    # instants, {unit}: {proposal.rate_hz:.8g} Hz"
     elif proposal.rate_from:
         yield f"sample_rate_hz = {proposal.rate_hz!r}    # by {_one_line(proposal.rate_from)} in the file"
     else:
