@@ -103,7 +103,7 @@ def _list_of_records(
 ) -> tuple[str, Mapping[str, Value]]:
     """Return path and first entry of a list of structures or of arrays, one for each record, or an empty path.
 
-    A list of signals is none: the file describes each, by its path in ``described``.
+    A list of signals is none: the file describes each, by its path in ``described``, or describes signals beside it.
     """
     for key, value in group.items():
         path = f"{above}.{key}" if above else key
@@ -116,7 +116,11 @@ def _list_of_records(
         first = entries[0] if entries else None
         if isinstance(first, dict) and all(isinstance(entry, dict) for entry in entries):
             return path, first
-        elif len(entries) > 1 and all(_is_long(entry) and _width(entry) == _width(first) for entry in entries):
+        elif (
+            len(entries) > 1
+            and not any(name in group for name in described)
+            and all(_is_long(entry) and _width(entry) == _width(first) for entry in entries)
+        ):
             return path, {".": first}
     return "", {}
 
