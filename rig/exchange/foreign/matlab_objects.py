@@ -50,7 +50,7 @@ def read_objects(
     """
     try:
         from matio import load_from_mat
-    except ImportError:
+    except (ImportError, AttributeError, KeyError):  # the latter by a version of pandas that it does not know
         name, kind = next((name, kind) for name, kind in kinds.items() if kind)
         reason = "which needs the package mat-io (pip install 'vibrolock[formats]')"
         raise ValueError(f"'{name}' is a MATLAB {kind}, {reason}; or {advice(name, kind)}") from None

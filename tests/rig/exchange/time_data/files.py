@@ -1,6 +1,7 @@
 """Files of time data, made by the programs of others: a force in newtons and an acceleration, white noise through a filter."""
 
 import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,11 @@ import pyuff
 import scipy.io
 import soundfile
 from asammdf import MDF, Signal
-from matio import save_to_mat
 from nptdms import ChannelObject, TdmsWriter
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # mat-io sets an option that pandas calls deprecated
+    from matio import save_to_mat
 
 RATE_HZ = 2048.0
 N = 4000
