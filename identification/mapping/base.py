@@ -14,8 +14,10 @@ from identification.mapping.units import UNITS, is_signal_unit, si_of
 from vibrolock.arrays import Complex, Float
 from vibrolock.described import Described
 from vibrolock.errors import InputError
+from vibrolock.quantities import quantity
 
 _STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
+_IN_BRACKETS = re.compile(r"\S\s*[\[(]([^\[\]()]+)[\])]\s*$")
 _PATH = re.compile(r"([^.\[\]]+|\[\d+\])(\.[^.\[\]]+|\[\d+\])*")
 Path = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -148,10 +150,13 @@ class ComplexPaths(MappingTable):
     """Path of the imaginary parts."""
     amplitude: Path | None = None
     """Path of the amplitudes."""
+    amplitude_unit: Literal["linear", "dB"] | None = None
+    """``dB`` for decibels, ``20 log10`` of the amplitude in the unit of the channels; if left out, as the name of the column
+    ends (``H [dB]``), else linear."""
     phase: Path | None = None
     """Path of the phases, positive if leading; zero if left out."""
-    phase_unit: Literal["deg", "rad"] = "deg"
-    """Unit of the phases."""
+    phase_unit: Literal["deg", "rad"] | None = None
+    """Unit of the phases; if left out, as the name of the column ends (``phase [rad]``), else deg."""
 
     @model_validator(mode="after")
     def _one_way(self) -> "ComplexPaths":
@@ -166,15 +171,19 @@ class SpectrumMapping(MeasurementMapping):
 
     frequency: Path
     """Path of the frequencies."""
-    frequency_unit: Literal["Hz", "rad/s"] = "Hz"
-    """Unit of the frequencies."""
+    frequency_unit: Literal["Hz", "rad/s"] | None = None
+    """Unit of the frequencies; if left out, as the name of the column ends (``f [kHz]``), else Hz."""
     sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
     """Convention of the stored complex numbers: with ``exp(+iwt)`` a lagging signal has the smaller phase."""
 
     def frequency_hz(self, data: Any) -> Float:
         """float[n]: the frequencies in ``data``."""
         stored = np.asarray(numbers(value_at(data, self.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
-        return stored / (1.0 if self.frequency_unit == "Hz" else 2.0 * np.pi)
+        found = quantity(said_of(data, self.frequency))
+        said = found.si if found is not None and found.si in ("Hz", "rad/s") else ""
+        unit = one_of(self.frequency_unit, said, "Hz", "frequency_unit", self.frequency)
+        factor = float(found.factor) if said and found is not None else 1.0
+        return np.asarray(stored * (factor / (1.0 if unit == "Hz" else 2.0 * np.pi)))
 
 
 def check_names(channels: Sequence[ChannelMapping]) -> None:
@@ -213,5 +222,49 @@ def complex_at(data: Any, paths: str | ComplexPaths, ndim: int, where: str) -> C
         raise IdentificationError(f"{where}: unequal lengths ({parts[0].shape} and {parts[1].shape})")
     if paths.real is not None:
         return np.asarray(parts[0] + 1j * parts[1])
-    turn = np.radians(parts[1]) if paths.phase_unit == "deg" else parts[1]
-    return np.asarray(parts[0] * np.exp(1j * turn))
+    return np.asarray(_linear(parts[0], paths, data, where) * np.exp(1j * _radians(parts[1], paths, data, where)))
+
+
+def _linear(amplitude: NDArray[Any], paths: ComplexPaths, data: Any, where: str) -> NDArray[Any]:
+    """Return amplitudes that are stored as such or in decibels; raise `IdentificationError` for negative ones."""
+    path = str(paths.amplitude)
+    said = "dB" if said_of(data, path).lower().startswith("db") else ""
+    unit = one_of(paths.amplitude_unit, said, "linear", f"{where}.amplitude_unit", path)
+    if unit == "dB":
+        return np.asarray(10.0 ** (amplitude / 20.0))
+    if np.any(amplitude < 0.0):
+        at = int(np.argmax(amplitude.ravel() < 0.0))
+        raise IdentificationError(
+            f"amplitude [{at}] of '{path}' is {amplitude.ravel()[at]:g}, below 0",
+            field=where,
+            hint='amplitudes in decibels need amplitude_unit = "dB"',
+        )
+    return amplitude
+
+
+def _radians(phase: NDArray[Any], paths: ComplexPaths, data: Any, where: str) -> NDArray[Any]:
+    path = str(paths.phase or "")
+    found = quantity(said_of(data, path)) if paths.phase else None
+    said = {quantity("deg"): "deg", quantity("rad"): "rad"}.get(found, "") if found is not None else ""
+    unit = one_of(paths.phase_unit, said, "deg", f"{where}.phase_unit", path)
+    return np.radians(phase) if unit == "deg" else phase
+
+
+def one_of(given: str | None, said: str, default: str, field: str, path: str) -> str:
+    """Return the unit that a mapping gives or else the file says; raise `IdentificationError` if these differ."""
+    if given is not None and said and given != said:
+        raise IdentificationError(f"the file says {said} of '{path}'", field=field, value=given)
+    return given or said or default
+
+
+def said_of(data: Any, path: str) -> str:
+    """Return the unit that a file says of a value, also in brackets at the end of its name; empty if it says none."""
+    units = data.get("__units__") if isinstance(data, Mapping) else None
+    found = _IN_BRACKETS.search(path)
+    return str((units or {}).get(path, "")) or (found[1].strip() if found else "")
+
+
+def notes_of(data: Any) -> tuple[str, ...]:
+    """Return the remarks of the reader of a file on what it read and what it left out."""
+    notes = data.get("__notes__", ()) if isinstance(data, Mapping) else ()
+    return tuple(map(str, notes))

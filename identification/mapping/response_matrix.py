@@ -15,8 +15,11 @@ from identification.mapping.base import (
     SpectrumMapping,
     complex_at,
     in_si,
+    notes_of,
     value_at,
 )
+from identification.mapping.zero_line import without_line_at_0_hz
+from vibrolock.arrays import Float
 
 
 class PathMapping(MappingTable):
@@ -47,22 +50,23 @@ class ResponseMatrixMapping(SpectrumMapping):
 
 
 def map_response_matrix(data: Any, mapping: ResponseMatrixMapping) -> FrequencyResponseMatrix:
-    """Return the frequency responses in ``data`` in SI units, with lines in rising order.
+    """Return the frequency responses in ``data`` in SI units, without a line at 0 Hz that says nothing.
 
     Raises `IdentificationError` if a path does not exist, shapes or numbers do not fit, or a response is missing.
     """
     frequency = mapping.frequency_hz(data)
     outputs, out_factors = in_si(mapping.outputs)
     inputs, in_factors = in_si(mapping.inputs)
-    value = (
-        _matrix(data, mapping, frequency.size) if mapping.matrix is not None else _paths(data, mapping, frequency.size)
-    )
+    value = _matrix(data, mapping, frequency.size) if mapping.matrix is not None else _paths(data, mapping, frequency)
     value = value * (out_factors[:, None] / in_factors)
+    where = "`paths`" if mapping.matrix is None else "`matrix`"
+    frequency, value, notes = without_line_at_0_hz(frequency, value, outputs, where)
     return FrequencyResponseMatrix(
         outputs=outputs,
         inputs=inputs,
         frequency_hz=frequency,
         value=value if mapping.sense == "exp(+iwt)" else np.conj(value),
+        notes=(*notes_of(data), *notes),
         estimator=mapping.estimator,
         specimen=mapping.specimen,
     )
@@ -76,8 +80,9 @@ def _matrix(data: Any, mapping: ResponseMatrixMapping, lines: int) -> Any:
     return array.reshape(wanted).astype(np.complex128)
 
 
-def _paths(data: Any, mapping: ResponseMatrixMapping, lines: int) -> Any:
+def _paths(data: Any, mapping: ResponseMatrixMapping, frequency_hz: Float) -> Any:
     outputs, inputs = ([channel.name for channel in group] for group in (mapping.outputs, mapping.inputs))
+    lines, given = frequency_hz.size, set[tuple[str, str]]()
     value = np.full((lines, len(outputs), len(inputs)), complex(np.nan, np.nan))
     for number, path in enumerate(mapping.paths):
         where = f"paths[{number}]"
@@ -87,11 +92,12 @@ def _paths(data: Any, mapping: ResponseMatrixMapping, lines: int) -> Any:
         response = complex_at(data, path.value, 1, f"{where}.value")
         if response.size != lines:
             raise IdentificationError(f"{response.size} values for {lines} frequencies", field=f"{where}.value")
-        if not np.all(np.isfinite(response)):
-            reason = f"is not finite at [{int(np.argmin(np.isfinite(response)))}]"
-            raise IdentificationError(reason, field=f"{where}.value")
+        faults = ~np.isfinite(response) & (frequency_hz != 0.0)
+        if faults.any():
+            at = int(np.argmax(faults))
+            raise IdentificationError(f"is not finite at [{at}], {frequency_hz[at]:g} Hz", field=f"{where}.value")
         value[:, outputs.index(path.output), inputs.index(path.input)] = response
-    missing = [f"{o} to {i}" for k, o in enumerate(outputs) for j, i in enumerate(inputs) if np.isnan(value[0, k, j])]
-    if missing:
+        given.add((path.output, path.input))
+    if missing := [f"{o} to {i}" for o in outputs for i in inputs if (o, i) not in given]:
         raise IdentificationError(f"the response of {', '.join(missing)} is missing", field="paths")
     return value

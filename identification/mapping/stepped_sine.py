@@ -152,7 +152,9 @@ def _response(
         raise IdentificationError(f"is {state.format(group.response)} numbers", field=f"{where}.phase")
     for name in ("force", "response"):
         if not np.iscomplexobj(stored[name]) and np.any(stored[name] < 0.0):
-            raise IdentificationError(f"{where}.{name}, level {index + 1}: an amplitude is below zero; check the path")
+            raise IdentificationError(
+                f"{where}.{name}, level {index + 1}: an amplitude is below zero; check the path, and convert decibels"
+            )
     force = np.asarray(stored["force"] * (force_scale * peak), dtype=np.complex128)
     response = np.asarray(stored["response"] * (response_scale * peak), dtype=np.complex128)
     if group.phase is not None and mapping.phase is not None:

@@ -10,7 +10,7 @@ from identification.errors import IdentificationError
 from identification.experiments.periodicity import check_periods, period_remark
 from identification.experiments.time_experiments import resampled_periods
 from identification.experiments.time_records import TimeRecord, TimeRecords
-from identification.mapping.base import entries_at, in_si, value_at
+from identification.mapping.base import entries_at, in_si, notes_of, value_at
 from identification.mapping.sampling import common_rate_hz, instants_at, rate_of_file_hz, seconds_of_time
 from identification.mapping.series import common_length, series
 from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
@@ -84,7 +84,7 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         instrument=mapping.instrument,
         specimen=mapping.specimen,
         source=mapping.source,
-        notes=notes,
+        notes=(*(note for one in every.values() for note in notes_of(one)), *notes),
     )
     check_periods(found)
     remark = period_remark(found)

@@ -8,7 +8,7 @@ say, the mapping says.
 """
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,6 +39,10 @@ class Use:
     """Whether the mapping makes another quantity of it."""
     stored: bool = False
     """Whether the mapping holds against what the file says of it."""
+    amplitude: bool = False
+    """Whether it is an amplitude, which may be in decibels of its unit."""
+    or_unit: str = ""
+    """Another unit that says the same: that of the output of a frequency response."""
 
 
 def for_mapping(
@@ -103,6 +107,10 @@ def _with_sampling(
     out: dict[str, object] = dict(meant(data, stored))
     if any(channel.in_si for channel in data.channels.values()):
         out["units"] = {name: channel.unit for name, channel in data.channels.items()}
+    if data.notes:
+        out["__notes__"] = data.notes
+    if units := {use.path: data.unit(use.path) for use in uses if not use.stored and data.unit(use.path)}:
+        out["__units__"] = units
     if against:
         out.pop("sample_rate_hz", None)
         return out
@@ -133,7 +141,7 @@ def _check(use: Use, data: FileData) -> None:
             hint="with `against_file = true` it is taken as stored",
         )
     given = data.unit(use.path)
-    if not says_a_unit(given) or use.rescaled:
+    if not says_a_unit(given) or use.rescaled or (use.amplitude and given.strip().lower().startswith("db")):
         return
     of_file, of_mapping = quantity(given), quantity(use.unit)
     if use.where == "time":
@@ -145,7 +153,9 @@ def _check(use: Use, data: FileData) -> None:
                 hint="write that, or `against_file = true` if the file is wrong",
             )
         return
-    if not use.unit or use.unit == given or (of_file is not None and of_file == of_mapping):
+    if not use.unit or given in (use.unit, use.or_unit) or (of_file is not None and of_file == of_mapping):
+        return
+    if of_file is not None and use.or_unit and of_file == quantity(use.or_unit):
         return
     reason = f"the file's own units make it {given}; write that"
     hint = "or `against_file = true` in the channel if the file is wrong"
@@ -162,9 +172,11 @@ def _uses(mapping: "BaseModel") -> Iterator[Use]:
     if isinstance(time := getattr(mapping, "time", None), str):
         yield Use("time", time, getattr(mapping, "time_unit", ""), stored=against)
     if isinstance(frequency := getattr(mapping, "frequency", None), str):
-        yield Use("frequency_unit", frequency, getattr(mapping, "frequency_unit", "Hz"), stored=against)
+        yield Use("frequency_unit", frequency, getattr(mapping, "frequency_unit", "Hz") or "", stored=against)
     for channel in getattr(mapping, "channels", ()):
         yield from _of_channel(channel)
+    if isinstance(mapping, i.ResponseMatrixMapping):
+        yield from _of_responses(mapping)
     if isinstance(mapping, i.FrequencyResponseMapping):
         units, phase = mapping.units, mapping.phase
         for group in mapping.sets:
@@ -182,8 +194,26 @@ def _of_channel(channel: Any) -> Iterator[Use]:
     if isinstance(value, str):
         yield Use(f"{where}.unit", value, unit, rescaled=rescaled, **about)
         return
+    yield from _of_parts(Use(f"{where}.unit", "", unit, rescaled=rescaled, **about), value)
+
+
+def _of_parts(use: Use, value: Any) -> Iterator[Use]:
+    """Yield the parts of complex numbers, each as ``use`` would be."""
     for part in ("real", "imaginary", "amplitude"):
         if (path := getattr(value, part)) is not None:
-            yield Use(f"{where}.unit", path, unit, rescaled=rescaled, **about)
+            yield replace(use, path=path, amplitude=part == "amplitude")
     if value.phase is not None:
-        yield Use(f"{where}.value.phase_unit", value.phase, value.phase_unit, **about)
+        where = f"{use.where.removesuffix('.unit')}.phase_unit"
+        yield replace(use, path=value.phase, where=where, unit=value.phase_unit or "", or_unit="", rescaled=False)
+
+
+def _of_responses(mapping: Any) -> Iterator[Use]:
+    """Yield the frequency responses of a mapping, each in the unit of its output over that of its input."""
+    units = {channel.name: channel.unit for channel in (*mapping.outputs, *mapping.inputs)}
+    for number, one in enumerate(mapping.paths):
+        above, below = units.get(one.output, ""), units.get(one.input, "")
+        use = Use(f"paths[{number}].value", "", f"({above})/({below})", or_unit=above)
+        if isinstance(one.value, str):
+            yield replace(use, path=one.value)
+        else:
+            yield from _of_parts(use, one.value)

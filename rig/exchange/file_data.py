@@ -72,7 +72,10 @@ class FileData:
     """What the file says of its channels, by the name of the value."""
     sample_rate_hz: float | None = None
     """Sample rate of all channels, Hz; None if the file gives none."""
-
+    notes: tuple[str, ...] = ()
+    """Remarks on what was read and what was left out, one line each."""
+    repeated: tuple[str, ...] = ()
+    """Names of values that hold others once more; they can be mapped, and are not proposed."""
     begins_s: float | None = None
     """Instant from which the start times of the channels count, s since 1970 (UTC); None if the file gives none."""
 

@@ -79,7 +79,7 @@ def import_file(
         raise ImportFailed.of(error, where=path) from None
     except IdentificationError as error:
         fit = "" if mapping is None else f" does not fit {mapping}"
-        raise ImportFailed.of(error, where=f"{path}{fit}") from None
+        raise ImportFailed.of(error, where="" if str(path) in str(error) else f"{path}{fit}") from None
 
 
 def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> "tuple[i.FrequencyResponse, ...]":

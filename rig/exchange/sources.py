@@ -8,7 +8,8 @@ from rig.errors import ConfigurationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.file_data import FileData, from_variables, in_full
 from rig.exchange.foreign.attributes import facts_of_attributes
-from rig.exchange.uff.reading import read_uff, time_data_in
+from rig.exchange.uff.reading import read_uff
+from rig.exchange.uff.time_data import time_data_in
 
 if TYPE_CHECKING:
     from identification.mapping import CsvLayout

@@ -63,7 +63,9 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
     top = {
         key: value
         for key, value in meant(data).items()
-        if key not in _NO_DATA and not key.startswith("__") and not (full_names and isinstance(value, dict))
+        if key not in (*_NO_DATA, *data.repeated)
+        and not key.startswith("__")
+        and not (full_names and isinstance(value, dict))
     }
     records, inside = _list_of_records(top, data.channels)
     arrays: list[Leaf] = []

@@ -69,7 +69,8 @@ def is_time(name: str, values: NDArray[np.generic], unit: str = "") -> bool:
 def role_of(name: str, unit: str) -> tuple[str, str]:
     """Return role and unit of a channel by its name and the unit that the file tells.
 
-    The role is ``motion`` for drive or response and empty if it is unknown, the unit ``1`` if it is unknown.
+    The role is ``motion`` for drive or response, ``monitor`` in a unit of anything else, and empty if it is unknown; the unit
+    is ``1`` if it is unknown.
     """
     try:
         known = si_of(unit, name)[0] if unit else ""
@@ -78,6 +79,8 @@ def role_of(name: str, unit: str) -> tuple[str, str]:
     if known:
         role = {"N": "force", "m": "motion", "m/s": "motion", "m/s2": "motion", "V": "monitor"}.get(known, "")
         return role or role_of(name, "")[0], unit
+    if says_a_unit(unit):
+        return "monitor", unit  # pascals, for example: no force and no motion
     for pattern, role, assumed in (
         (_FORCES, "force", "1"),
         (_VOLTAGES, "monitor", "V"),

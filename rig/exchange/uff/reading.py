@@ -1,4 +1,4 @@
-"""Read the datasets of a universal file, check that they are complete, and extract their time data."""
+"""Read the datasets of a universal file, and check that they are complete."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,21 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification import IdentificationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.exchange.file_data import ChannelFacts, FileData, side_by_side
-from rig.exchange.uff.units import file_units
-from rig.exchange.universal_file import (
-    TIME_RESPONSE,
-    Axis,
-    Function,
-    ModeShape,
-    UnitSystem,
-    UniversalFile,
-    degree_name,
-)
+from rig.exchange.universal_file import Axis, Function, ModeShape, UnitSystem, UniversalFile
 from rig.system.text_files import read_bytes
-from vibrolock.arrays import Float
+from vibrolock.quantities import says_a_unit
 
 if TYPE_CHECKING:
     import pyuff
@@ -29,8 +18,10 @@ if TYPE_CHECKING:
 LARGEST_BYTES = 2_000_000_000  # largest file that is read, bytes; chosen
 _KNOWN = (55, 58, 151, 164)  # datasets that are read: shapes, functions, header, units
 _NORMAL_MODE = 2  # analysis type of a normal mode
-_MAX_DIFFERENCE = 0.01
-"""Relative difference of the lengths of two records up to which both are cut; chosen: a recorder stops some samples late."""
+_NO_LETTER = "\ufffd"  # what pyuff has in place of a letter that is no UTF-8
+_IDS, _AXES = ("id1", "id2", "id3", "id4", "id5"), ("abscissa", "ordinate", "orddenom", "z_axis")
+_FIRST_ID, _FIRST_AXIS = 2, 9  # lines of a dataset 58, from its beginning
+_LABEL, _UNIT = slice(26, 46), slice(47, 67)  # columns of an axis that hold texts
 
 
 def read_uff(path: Path) -> UniversalFile:
@@ -55,7 +46,7 @@ def datasets_in(path: Path) -> UniversalFile:
         types = [int(number) for number in file.get_set_types()]
     except Exception as error:  # pyuff raises no more specific error
         raise ImportFailed(f"{path}: is a damaged universal file ({error})") from None
-    found = list(_datasets(file, types, path))
+    found = list(_datasets(file, types, path, text))
     return UniversalFile(
         functions=tuple(one for one in found if isinstance(one, Function)),
         modes=tuple(one for one in found if isinstance(one, ModeShape)),
@@ -66,7 +57,7 @@ def datasets_in(path: Path) -> UniversalFile:
 
 
 def _datasets(
-    file: "pyuff.UFF", types: Sequence[int], path: Path
+    file: "pyuff.UFF", types: Sequence[int], path: Path, text: bytes
 ) -> Iterator[Function | ModeShape | UnitSystem | None]:
     """Yield the known datasets; None for the header and for shapes that are no normal modes."""
     for number, kind in enumerate(types):
@@ -74,11 +65,27 @@ def _datasets(
             continue
         where = f"{path}, dataset {number + 1} (type {kind})"
         try:
-            yield _dataset(kind, file.read_sets(number), where)
+            start, end = file._block_ind[number]
+            yield _dataset(kind, _readable(file.read_sets(number), text[start:end]), where)
         except ImportFailed:
             raise
         except Exception as error:
             raise ImportFailed(f"{where}: is damaged or in a variant that is not understood ({error})") from None
+
+
+def _readable(table: dict[str, object], block: bytes) -> Mapping[str, object]:
+    """Return a dataset 58 with its texts as Latin-1 if they are no UTF-8, which is what older programs write."""
+    if table.get("type") != 58 or not any(
+        _NO_LETTER in str(value) for value in table.values() if isinstance(value, str)
+    ):
+        return table
+    lines = block.split(b"\n", _FIRST_AXIS + len(_AXES))
+    plain = [line.decode("latin-1").rstrip() for line in lines[:-1]]
+    texts = {name: plain[_FIRST_ID + row].strip() for row, name in enumerate(_IDS)}
+    for row, name in enumerate(_AXES):
+        line = plain[_FIRST_AXIS + row]
+        texts |= {f"{name}_axis_lab": line[_LABEL].strip(), f"{name}_axis_units_lab": line[_UNIT].strip()}
+    return {**table, **texts}
 
 
 def _dataset(kind: int, table: Mapping[str, object], where: str) -> Function | ModeShape | UnitSystem | None:
@@ -101,8 +108,6 @@ def _dataset(kind: int, table: Mapping[str, object], where: str) -> Function | M
     if data.size < wanted:
         raise ImportFailed(f"{where}: holds {data.size} of {wanted} values")
     data = data[:wanted]
-    if not np.all(np.isfinite(data)):
-        raise ImportFailed(f"{where}: value {int(np.argmin(np.isfinite(data))) + 1} is not finite")
     return Function(
         where=where,
         type=_whole(table, "func_type"),
@@ -113,6 +118,7 @@ def _dataset(kind: int, table: Mapping[str, object], where: str) -> Function | M
         reference=(_whole(table, "ref_node"), _whole(table, "ref_dir")),
         even=_whole(table, "abscissa_spacing") == 1,
         step=_real(table, "abscissa_inc"),
+        abscissa=_axis(table, "abscissa"),
         ordinate=_axis(table, "ordinate"),
         denominator=_axis(table, "orddenom"),
         x=np.asarray(table["x"], np.float64)[:wanted],
@@ -121,11 +127,9 @@ def _dataset(kind: int, table: Mapping[str, object], where: str) -> Function | M
 
 
 def _axis(table: Mapping[str, object], prefix: str) -> Axis:
-    return Axis(
-        int(str(table.get(f"{prefix}_spec_data_type", 0))),
-        str(table.get(f"{prefix}_axis_lab", "")),
-        str(table.get(f"{prefix}_axis_units_lab", "")),
-    )
+    label, unit = (str(table.get(f"{prefix}_axis_{name}", "")).strip() for name in ("lab", "units_lab"))
+    code = int(str(table.get(f"{prefix}_spec_data_type", 0)))
+    return Axis(code, "" if label == "NONE" else label, unit if says_a_unit(unit) else "")
 
 
 def _whole(table: Mapping[str, object], key: str) -> int:
@@ -134,59 +138,3 @@ def _whole(table: Mapping[str, object], key: str) -> int:
 
 def _real(table: Mapping[str, object], key: str) -> float:
     return float(str(table[key]))
-
-
-def time_data_in(file: UniversalFile, assumed: str = "") -> FileData:
-    """Return the time functions (type 1) by name, with one column per record, in SI if they have units.
-
-    The values also have ``sets``, the list of all functions. Raises `ImportFailed` if there are none, or if their rates
-    disagree.
-    """
-    functions = file.of_type(TIME_RESPONSE)
-    if not functions:
-        raise ImportFailed(f"no time data (dataset 58 of function type 1) among {file.count} datasets")
-    units = file_units(file, assumed)
-    rates: list[float] = []
-    records: dict[str, list[Float]] = {}
-    sets: list[Float] = []
-    known: dict[str, str] = {}
-    for function in functions:
-        rates.append(_rate(function))
-        if abs(rates[-1] / rates[0] - 1.0) > 1e-9:
-            raise ImportFailed(f"{function.where}: sample rate {rates[-1]:g} Hz, that of the first is {rates[0]:g} Hz")
-        name = function.lines[0] if function.own else degree_name(function.response)
-        try:
-            unit, factor = units.of(function.ordinate, "ordinate", function.where)
-        except (ImportFailed, IdentificationError):
-            if assumed or function.ordinate.data_type:
-                raise
-            unit, factor = "", 1.0  # an unknown quantity without unit: the mapping says what it is
-        sets.append(np.asarray(np.real(function.data), np.float64) * factor)
-        records.setdefault(name, []).append(sets[-1])
-        before = len(records[name][0])
-        if abs(len(sets[-1]) - before) > _MAX_DIFFERENCE * before:
-            raise ImportFailed(
-                f"{function.where}: {name} has {len(sets[-1])} samples, before {before}; wanted are records of one length"
-            )
-        known[name] = unit
-    return FileData(
-        values={**{name: side_by_side(several) for name, several in records.items()}, "sets": [*sets]},
-        channels={name: ChannelFacts(unit=unit, in_si=True) for name, unit in known.items()},
-        sample_rate_hz=rates[0],
-    )
-
-
-def _rate(function: Function) -> float:
-    """Return the sample rate of line 5 if it agrees with the header to the header's six digits, else that of the header.
-
-    Of the rates with these six digits of the step, the one with the fewest digits is taken: 2048 Hz, not 2048.001 Hz.
-    """
-    step = function.step
-    if not function.even or step <= 0.0:
-        raise ImportFailed(f"{function.where}: is not evenly sampled; wanted is a step above zero")
-    rate = 1.0 / step
-    stated = re.match(r"sample rate (\S+) Hz", function.lines[4])
-    if stated and abs(float(stated[1]) / rate - 1.0) < 1e-5:
-        return float(stated[1])
-    rounded = (float(f"{rate:.{digits}g}") for digits in range(1, 7))
-    return next((one for one in rounded if f"{1.0 / one:.5e}" == f"{step:.5e}"), rate)

@@ -2,16 +2,18 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from identification import Channel, FrequencyResponse, FrequencyResponseMatrix
+from identification import Channel, FrequencyResponse, FrequencyResponseMatrix, IdentificationError
 from identification.common import Controlled, Motion, Role
+from identification.mapping import without_line_at_0_hz
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.uff.units import FileUnits, file_units
+from rig.exchange.uff.units import FileUnits, file_units, hertz_of
 from rig.exchange.universal_file import FREQUENCY_RESPONSE, GENERAL, Function, UniversalFile, degree_name
-from vibrolock.arrays import Complex
+from vibrolock.arrays import Complex, Float
 
 
 def _names(function: Function) -> tuple[str, str]:
@@ -29,8 +31,9 @@ def responses_in(
 
     Where a response is there more than once, each load case is a matrix of its own, in the order of the file: a level of a
     multisine, in a file of this package. The levels of a stepped sine of this package are one object. A response with the node
-    and axis of a reference is the drive point. Raises `ImportFailed` for missing or duplicate paths, unequal frequencies, or
-    unclear units.
+    and axis of a reference is the drive point; one in the opposite direction is turned. Responses in units of something else,
+    such as a pressure, and functions of other types are left out, and a line at 0 Hz that says nothing, each with a note.
+    Raises `ImportFailed` for missing or duplicate paths, unequal frequencies, or unclear units.
     """
     functions = file.of_type(FREQUENCY_RESPONSE)
     units = file_units(file, assumed)
@@ -38,21 +41,60 @@ def responses_in(
         return [_stepped_sines(file, functions)]
     if not functions:
         raise ImportFailed(f"no frequency response (dataset 58 of function type 4) among {file.count} datasets")
+    functions, notes = _turned(*_of_motions(functions, units))
+    notes = (*file.left_out(FREQUENCY_RESPONSE), *notes)
     names = [_names(function) for function in functions]
     if len(set(names)) == len(names):
-        return [_matrix(functions, units)]
+        return [_matrix(functions, units, notes)]
     cases = dict.fromkeys(function.load_case for function in functions)
-    return [_matrix([one for one in functions if one.load_case == case], units) for case in cases]
+    return [_matrix([one for one in functions if one.load_case == case], units, notes) for case in cases]
 
 
-def _matrix(functions: Sequence[Function], units: FileUnits) -> FrequencyResponseMatrix:
+def _of_motions(functions: Sequence[Function], units: FileUnits) -> tuple[list[Function], tuple[str, ...]]:
+    """Return the functions whose units are understood, and a note on the others; raise the first error if all are others."""
+    kept, errors, labels = [], list[IdentificationError](), dict[str, None]()
+    for function in functions:
+        try:
+            units.of_response(function)
+            kept.append(function)
+        except IdentificationError as error:
+            errors.append(error)
+            labels[f"{function.ordinate.unit or '?'}/{function.denominator.unit or '?'}"] = None
+    if not kept:
+        raise errors[0]
+    told = f"left out of the universal file: {len(errors)} frequency responses in {', '.join(labels)}"
+    return kept, (told,) if errors else ()
+
+
+def _turned(functions: Sequence[Function], notes: tuple[str, ...]) -> tuple[list[Function], tuple[str, ...]]:
+    """Return the functions with the responses turned that are opposite to the direction of a force at their node."""
+    forces = {(one.reference[0], one.reference[1]) for one in functions}
+    against = {(node, -direction) for node, direction in forces if direction} - forces
+    turned = {(one.response[0], one.response[1]) for one in functions if not one.own} & against
+    notes += tuple(
+        f"{degree_name(one)} is turned to {degree_name((one[0], -one[1]))}, the direction of the force there"
+        for one in sorted(turned)
+    )
+    return [
+        replace(one, response=(one.response[0], -one.response[1]), data=-np.asarray(one.data))
+        if tuple(one.response) in turned
+        else one
+        for one in functions
+    ], notes
+
+
+def _frequencies(function: Function) -> Float:
+    return np.asarray(function.x * hertz_of(function))
+
+
+def _matrix(functions: Sequence[Function], units: FileUnits, notes: tuple[str, ...]) -> FrequencyResponseMatrix:
     paths: dict[tuple[str, str], Complex] = {}
     outputs: dict[str, Channel] = {}
     inputs: dict[str, Channel] = {}
     rms: dict[str, float] = {}
-    frequency_hz = functions[0].x
+    frequency_hz = _frequencies(functions[0])
     for function in functions:
-        where, x = function.where, function.x
+        where, x = function.where, _frequencies(function)
         if len(x) != frequency_hz.size or not np.allclose(x, frequency_hz, rtol=1e-6):
             raise ImportFailed(f"{where}: its frequencies are not those of the first; import such files one by one")
         output, source = _names(function)
@@ -76,11 +118,14 @@ def _matrix(functions: Sequence[Function], units: FileUnits) -> FrequencyRespons
             f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs"
         )
     estimator = re.search(r", estimator ([^,]+)", functions[0].lines[4])
+    value = np.array([[paths[o, i] for i in inputs] for o in outputs]).transpose(2, 0, 1)
+    frequency_hz, value, zero = without_line_at_0_hz(frequency_hz, value, tuple(outputs.values()), functions[0].where)
     return FrequencyResponseMatrix(
         outputs=tuple(outputs.values()),
         inputs=tuple(inputs.values()),
         frequency_hz=frequency_hz,
-        value=np.array([[paths[o, i] for i in inputs] for o in outputs]).transpose(2, 0, 1),
+        value=value,
+        notes=(*notes, *zero),
         estimator=estimator[1] if estimator else "imported",
         input_rms=tuple(rms[name] for name in inputs) if set(rms) == set(inputs) else (),
         specimen=_text(functions[0].lines[1]),
@@ -93,9 +138,12 @@ def _text(line: str) -> str:
 
 def _path(function: Function, units: FileUnits, output: str, source: str) -> tuple[Complex, tuple[Channel, Channel]]:
     """Return one response in SI, and its two channels."""
-    out_unit, out_factor = units.of(function.ordinate, "ordinate", function.where)
-    in_unit, in_factor = units.of(function.denominator, "orddenom", function.where)
-    value = np.asarray(function.data, dtype=np.complex128) * (out_factor / in_factor)
+    out_unit, in_unit, factor = units.of_response(function)
+    if not np.iscomplexobj(function.data):
+        raise ImportFailed(
+            f"{function.where}: the frequency response is stored as real numbers; wanted are complex ones, with their phases"
+        )
+    value = np.asarray(function.data, dtype=np.complex128) * factor
     if roles := re.match(r"(\w+) / (\w+), estimator", function.lines[4]):
         return value, (Channel(output, cast(Role, roles[1]), out_unit), Channel(source, cast(Role, roles[2]), in_unit))
     (node, direction), (at, along) = function.response, function.reference

@@ -1,10 +1,11 @@
 """Storage, table, figure, curves and exchange of a backbone that was measured with another system."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from identification import Backbone, nonlinear_mode
+from identification import Backbone, IdentificationError, nonlinear_mode
 from rig.drawing.curves import Curves, View, backbone_curves
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, Figure, engineering, title
@@ -12,6 +13,7 @@ from rig.measurements.backbone_table import backbone_from, backbone_parts
 from rig.results.kind import Exchange, Storage, Table
 from rig.text.column import Column
 from rig.text.console import print_rows
+from rig.text.contents import Contents
 
 
 def _pack(backbone: Backbone) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -69,4 +71,21 @@ def curves(backbone: Backbone, view: View) -> Curves:
     return backbone_curves([(backbone, nonlinear_mode(backbone))], view)
 
 
-EXCHANGE = Exchange("backbone", Backbone, backbone_parts, backbone_from)
+def _exchanged(backbone: Backbone) -> Contents:
+    """Return the table of a backbone with modal frequency and damping of its settled points, where a mode shape is known."""
+    contents = backbone_parts(backbone)
+    settled = np.array([point.settled for point in backbone.points])
+    if backbone.drive_mode_shape is None or not settled.any():
+        return contents
+    try:
+        mode = nonlinear_mode(backbone.settled(), draws=0)
+    except IdentificationError:  # a point that says nothing: the table is then that of what was measured
+        return contents
+    arrays = dict(contents.arrays)
+    for name in ("modal_frequency_hz", "damping_ratio"):
+        arrays[name] = np.full(settled.size, np.nan)
+        arrays[name][settled] = getattr(mode, name)
+    return replace(contents, arrays=arrays, rows={**contents.rows, **dict.fromkeys(arrays, 0)})
+
+
+EXCHANGE = Exchange("backbone", Backbone, _exchanged, backbone_from)

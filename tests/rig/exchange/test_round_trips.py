@@ -1,11 +1,12 @@
 """What is written in another format is what is read back."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 from identification import NonlinearMode
 from identification.common import decode, encode
@@ -13,7 +14,8 @@ from rig.exchange.conversion import decoded, encoded
 from rig.exchange.export import write_contents
 from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.reading import import_file
-from rig.exchange.uff.reading import read_uff, time_data_in
+from rig.exchange.uff.reading import read_uff
+from rig.exchange.uff.time_data import time_data_in
 from rig.results.kinds import exchanges
 from rig.results.time_data.series import TimeData
 from tests.rig.exchange.conftest import CHANNELS
@@ -137,3 +139,18 @@ def test_numbers_of_a_table_are_those_that_numpy_reads(backbone, tmp_path):
     np.testing.assert_array_equal(
         table[:, row] + 1j * table[:, row + 1], [point.harmonics[0, 1] for point in backbone.points]
     )
+
+
+def test_a_backbone_as_mat_holds_modal_frequency_and_damping_as_identified(backbone, mode, tmp_path):
+    path = tmp_path / "backbone.mat"
+    write_contents([encoded(backbone)], path, "mat")
+    stored = loadmat(path, simplify_cells=True)["backbone"]
+    np.testing.assert_allclose(stored["damping_ratio"], mode.damping_ratio, rtol=1e-12)
+    np.testing.assert_allclose(stored["modal_frequency_hz"], mode.modal_frequency_hz, rtol=1e-12)
+    assert (stored["units"]["damping_ratio"], stored["units"]["modal_frequency_hz"]) == ("1", "Hz")
+
+
+def test_a_backbone_without_a_mode_shape_has_no_damping(backbone, tmp_path):
+    path = tmp_path / "backbone.mat"
+    write_contents([encoded(replace(backbone, drive_mode_shape=None))], path, "mat")
+    assert "damping_ratio" not in loadmat(path, simplify_cells=True)["backbone"]

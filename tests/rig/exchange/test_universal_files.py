@@ -1,5 +1,6 @@
 """Universal files against the definition of their datasets, read by pyuff and as plain text."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from rig.exchange.child_reading import ImportFailed
 from rig.exchange.conversion import encoded
 from rig.exchange.export import write_contents
 from rig.exchange.reading import import_file
-from rig.exchange.uff.reading import read_uff, time_data_in
+from rig.exchange.uff.reading import read_uff
+from rig.exchange.uff.time_data import time_data_in
 from rig.results.time_data.series import TimeData
 from tests.refused import refused
 from tests.rig.exchange.conftest import CHANNELS
@@ -23,7 +25,9 @@ def written(path: Path, *datasets: dict) -> Path:
     """A file as another program might write it."""
     file = pyuff.UFF(str(path))
     for dataset in datasets:
-        file.write_sets(dataset, "add")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves a binary file to the garbage collector
+            file.write_sets(dataset, "add")
     return path
 
 
@@ -161,7 +165,9 @@ def test_units_of_dataset_164_divide(tmp_path):
 
 @pytest.mark.parametrize(("choice", "factor"), [("labels", 1.0), ("file", 1e-3), ("si", 1.0)])
 def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
-    path = written(tmp_path / "mixed.uff", units(5, 1000.0, 1.0), response(np.ones(20), label="m/s^2", force_label="N"))
+    path = written(
+        tmp_path / "mixed.uff", units(10, 1000.0, 1.0), response(np.ones(20), label="m/s^2", force_label="N")
+    )
     with refused(ImportFailed, "mixed-units-the-ordinate-is-labelled"):
         import_file(path)
     np.testing.assert_allclose(import_file(path, units=choice).value, factor)
@@ -213,9 +219,12 @@ def test_a_file_that_is_no_universal_file_is_said_so(tmp_path, content):
 
 
 def test_rates_and_lengths_that_disagree_are_named(tmp_path):
-    path = written(tmp_path / "rates.uff", signal(np.ones(10)), signal(np.ones(10), node=2, rate=1100.0))
+    path = written(tmp_path / "rates.uff", signal(np.ones(10)), signal(np.ones(10), rate=1100.0))
     with refused(ImportFailed, "sample-rate-hz-that-of-the"):
         time_data_in(read_uff(path))
+    path = written(tmp_path / "two_rates.uff", signal(np.ones(10)), signal(np.ones(10), node=2, rate=1100.0))
+    found = time_data_in(read_uff(path))
+    assert [found.channels[name].sample_rate_hz for name in ("1+Z", "2+Z")] == [1000.0, 1100.0]
     path = written(tmp_path / "lengths.uff", signal(np.ones(10)), signal(np.ones(12)))
     with refused(ImportFailed, "has-samples-before"):
         time_data_in(read_uff(path))
