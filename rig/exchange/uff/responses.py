@@ -1,7 +1,7 @@
 """Read frequency responses from the datasets of a universal file."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -113,10 +113,7 @@ def _matrix(functions: Sequence[Function], units: FileUnits, notes: tuple[str, .
                 )
             if channel.role == "drive":
                 known[channel.name] = channel
-    if missing := [f"{o} to {i}" for o in outputs for i in inputs if (o, i) not in paths]:
-        raise ImportFailed(
-            f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs"
-        )
+    _check_complete(paths, outputs, inputs)
     estimator = re.search(r", estimator ([^,]+)", functions[0].lines[4])
     value = np.array([[paths[o, i] for i in inputs] for o in outputs]).transpose(2, 0, 1)
     frequency_hz, value, zero = without_line_at_0_hz(frequency_hz, value, tuple(outputs.values()), functions[0].where)
@@ -130,6 +127,14 @@ def _matrix(functions: Sequence[Function], units: FileUnits, notes: tuple[str, .
         input_rms=tuple(rms[name] for name in inputs) if set(rms) == set(inputs) else (),
         specimen=_text(functions[0].lines[1]),
     )
+
+
+def _check_complete(paths: Mapping[tuple[str, str], Complex], outputs: Iterable[str], inputs: Iterable[str]) -> None:
+    sources = list(inputs)
+    if missing := [f"{o} to {i}" for o in outputs for i in sources if (o, i) not in paths]:
+        raise ImportFailed(
+            f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs"
+        )
 
 
 def _text(line: str) -> str:

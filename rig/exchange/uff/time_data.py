@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.file_data import ChannelFacts, FileData
-from rig.exchange.uff.units import file_units, seconds_of
+from rig.exchange.uff.units import FileUnits, file_units, seconds_of
 from rig.exchange.universal_file import TIME_RESPONSE, Function, UniversalFile, degree_name
 
 _MAX_DIFFERENCE = 0.01
 """Relative difference of the lengths of two records up to which both are cut; chosen: a recorder stops some samples late."""
 _SAME_RATE = 1e-9  # relative difference of rates that counts as none
 _SAME_START, _ROUNDED = 0.05, 1e-5  # difference of starts that counts as none: samples, and relative by six digits
-_QUANTITIES = {
+_QUANTITIES: dict[str | int, str] = {
     **{"m": "displacement", "m/s": "velocity", "m/s2": "acceleration", "N": "force", "V": "voltage"},
     **{3: "strain", 5: "temperature", 8: "displacement", 9: "force", 11: "velocity", 12: "acceleration"},
     **{13: "force", 15: "pressure", 19: "speed"},
@@ -77,11 +77,7 @@ def time_data_in(file: UniversalFile, assumed: str = "") -> FileData:
         told = "".join(f"; {note}" for note in file.left_out())
         raise ImportFailed(f"no time data (dataset 58 of function type 1) among {file.count} datasets{told}")
     units = file_units(file, assumed)
-    signals = []
-    for function in functions:
-        unit, factor, in_si = units.of_signal(function.ordinate, function.where)
-        rate, start = _sampling(function)
-        signals.append(_Signal(function, _real(function, factor), unit, in_si, rate, start))
+    signals = [_signal(function, units) for function in functions]
     records = dict(_named(signals))
     _check_starts(records)
     first = signals[0].rate_hz
@@ -106,6 +102,12 @@ def time_data_in(file: UniversalFile, assumed: str = "") -> FileData:
         notes=file.left_out(TIME_RESPONSE),
         repeated=("sets",),
     )
+
+
+def _signal(function: Function, units: FileUnits) -> _Signal:
+    unit, factor, in_si = units.of_signal(function.ordinate, function.where)
+    rate, start = _sampling(function)
+    return _Signal(function, _real(function, factor), unit, in_si, rate, start)
 
 
 def _real(function: Function, factor: float) -> NDArray[np.generic]:
