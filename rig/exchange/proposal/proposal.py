@@ -123,12 +123,16 @@ def _like(leaf: Leaf, known: dict[str, int], samples: int) -> tuple[str, ...]:
 
 
 def _with_roles(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:
-    """Return the channels with one force and one drive point at most, and a role for each. One alone is a motion."""
+    """Return the channels with one force and one drive point at most, and a role for each. One alone is a motion.
+
+    Without a force, one whose unit in the file does not say otherwise is taken for it.
+    """
     out = list(channels)
-    if len(out) > 1 and not any(channel.role == "force" for channel in out):
-        at = next((i for i, c in enumerate(out) if c.role == "monitor"), None)
+    able = [i for i, c in enumerate(out) if not c.leaf.unit or c.played("force").unit == c.unit]
+    if len(out) > 1 and able and not any(channel.role == "force" for channel in out):
+        at = next((i for i in able if out[i].role == "monitor"), None)
         if at is None:  # by the names: V1 before V2
-            open_ = [i for i, c in enumerate(out) if not c.role] or list(range(len(out)))
+            open_ = [i for i in able if not out[i].role] or able
             at = min(open_, key=lambda i: out[i].name)
         out[at] = out[at].played("force")
     forces = [number for number, channel in enumerate(out) if channel.role == "force"]

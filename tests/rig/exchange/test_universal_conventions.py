@@ -238,3 +238,16 @@ def test_complex_samples_are_refused_where_they_are_mapped(tmp_path):
     path = written(tmp_path / "complex.uff", signal(SAMPLES), signal(SAMPLES + 1j, node=2))
     found = time_data(path)
     assert found.values["2+Z"].dtype.kind == "c"
+
+
+@pytest.mark.parametrize("others", [(), ("Pa",)])
+def test_a_proposed_mapping_of_accelerations_alone_imports_as_motions(tmp_path, others):
+    parts = [signal(SAMPLES * k, node=k) for k in (1, 2, 3)]
+    parts += [signal(SAMPLES, node=9, code=15, label=unit) for unit in others]
+    path = written(tmp_path / "output_only.uff", *parts)
+    (tmp_path / "m.toml").write_text(proposed(path, (), "", "").text, encoding="utf-8")
+    records = import_file(path, mapping=tmp_path / "m.toml")
+    assert [(c.role, c.unit) for c in records.channels] == [
+        *[("drive", "m/s2"), ("response", "m/s2"), ("response", "m/s2")],
+        *[("monitor", unit) for unit in others],
+    ]
