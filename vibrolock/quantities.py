@@ -52,8 +52,11 @@ def _made(factor: str, **exponents: int) -> Quantity:
 
 
 _POUND = "4.4482216152605"  # N per pound of force (BIPM, The International System of Units)
-GRAVITY = 9.80665
-"""Standard gravity, m/s2."""
+POUND_N = float(_POUND)
+"""A pound of force, N."""
+GRAVITY_M_S2 = 9.80665
+"""Standard gravity, m/s2: sensitivities are stated by g."""
+_G = str(GRAVITY_M_S2)
 _PREFIXED = {
     "m": _made("1", m=1), "s": _made("1", s=1), "sec": _made("1", s=1), "Hz": _made("1", s=-1),
     "N": _made("1", kg=1, m=1, s=-2), "V": _made("1", V=1), "A": _made("1", A=1), "C": _made("1", A=1, s=1),
@@ -62,9 +65,9 @@ _PREFIXED = {
 """Units that take prefixes."""
 _PLAIN = {
     "1": _made("1"), "%": _made("0.01"), "kg": _made("1", kg=1), "K": _made("1", K=1), "ohm": _made("1", V=1, A=-1),
-    "g": _made("9.80665", m=1, s=-2), "mg": _made("0.00980665", m=1, s=-2), "G": _made("9.80665", m=1, s=-2),
+    "g": _made(_G, m=1, s=-2), "mg": _made(_G, m=1, s=-2) / _made("1000"), "G": _made(_G, m=1, s=-2),
     "in": _made("0.0254", m=1), "ft": _made("0.3048", m=1), "mil": _made("0.0000254", m=1),
-    "lbf": _made(_POUND, kg=1, m=1, s=-2), "kgf": _made("9.80665", kg=1, m=1, s=-2),
+    "lbf": _made(_POUND, kg=1, m=1, s=-2), "kgf": _made(_G, kg=1, m=1, s=-2),
     "kip": _made(_POUND, kg=1, m=1, s=-2) * _made("1000"), "psi": _made(_POUND, kg=1, m=1, s=-2) / _made("0.00064516", m=2),
     "bar": _made("100000", kg=1, m=-1, s=-2), "min": _made("60", s=1), "h": _made("3600", s=1), "d": _made("86400", s=1),
     "rpm": _made("1/60", s=-1), "°": _made("0.017453292519943295", rad=1),
@@ -94,6 +97,13 @@ _NAMES = {
         **{"A": _PREFIXED["A"], "C": _PREFIXED["C"], "K": _PLAIN["K"], "ohm": _PLAIN["ohm"]},
     }.items()
 }
+SIGNALS = ("m", "m/s", "m/s2", "N", "V", "1")
+"""SI units of the signals of a test."""
+USUAL = (
+    *("m", "mm", "um", "in", "mil", "ft", "m/s", "mm/s", "in/s", "m/s2", "mm/s2", "in/s2", "g"),
+    *("N", "mN", "kN", "lbf", "kgf", "V", "mV", "1"),
+)
+"""Usual units of signals, as messages and pages list them; other spellings and prefixes are understood as well."""
 _NOTHING = ("", "-", "--", "none", "n/a", "na", "unknown", "undefined", "unit", "units", "?", "*")
 """Texts in the place of a unit that say that there is none, in small letters."""
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
         SampledChannel as SampledChannel,
         Stretch as Stretch,
     )
-    from identification.mapping.units import SIGNALS as SIGNALS, UNITS as UNITS, si_of as si_of
+    from identification.mapping.units import UNITS as UNITS, si_of as si_of
     from identification.mapping.zero_line import without_line_at_0_hz as without_line_at_0_hz
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

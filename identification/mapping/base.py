@@ -12,6 +12,7 @@ from identification.channels import Channel, Role
 from identification.errors import IdentificationError
 from identification.mapping.units import UNITS, is_signal_unit, si_of
 from vibrolock.arrays import Complex, Float
+from vibrolock.data_sheet import volts_per_unit
 from vibrolock.described import Described
 from vibrolock.errors import InputError
 from vibrolock.quantities import quantity
@@ -131,11 +132,18 @@ class ChannelMapping(MappingTable):
     """``force``, ``drive`` (motion where the force acts), ``response`` or ``monitor`` (such as a voltage)."""
     unit: str
     """Unit of the stored numbers."""
+    sensitivity: str = ""
+    """Sensitivity of the sensor as on its data sheet, such as ``10 mV/g``, where the stored numbers are volts (``unit`` is V or
+    mV)."""
     against_file: bool = False
     """Whether the mapping holds where the file says otherwise of this channel: unit, scale, offset, rate, start time."""
 
     @model_validator(mode="after")
     def _known(self) -> "ChannelMapping":
+        if self.sensitivity:
+            volts_per_unit(self.sensitivity)
+            if not is_signal_unit(self.unit) or si_of(self.unit, "unit")[0] != "V":
+                raise InputError("sensitivity makes volts a quantity", field="unit", value=self.unit, allowed="V or mV")
         if self.role != "monitor" and not is_signal_unit(self.unit):
             raise ValueError(f"unit = '{self.unit}' of channel '{self.name}': allowed is one of {', '.join(UNITS)}")
         return self
@@ -199,6 +207,9 @@ def in_si(channels: Sequence[ChannelMapping]) -> tuple[tuple[Channel, ...], NDAr
     for channel in channels:
         monitor = channel.role == "monitor" and not is_signal_unit(channel.unit)
         unit, factor = (channel.unit, 1.0) if monitor else si_of(channel.unit, f"unit of channel '{channel.name}'")
+        if channel.sensitivity:
+            volts, measured = volts_per_unit(channel.sensitivity)
+            unit, factor = si_of(measured, "sensitivity")[0], factor / volts
         found.append(Channel(channel.name, channel.role, unit))
         factors.append(factor)
     return tuple(found), np.array(factors)

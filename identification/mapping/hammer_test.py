@@ -24,6 +24,8 @@ class HammerChannel(SignalMapping):
 
     full_scale: Positive | None = None
     """Value in ``unit`` from which the channel is overloaded; if left out, equal samples at the extreme show an overload."""
+    scale: Positive = 1.0
+    """Factor from stored numbers to ``unit``, such as the inverse of a sensitivity."""
     inverted: bool = False
     """Whether the sensor shows the opposite sign; a blow is a positive force."""
 
@@ -72,7 +74,7 @@ def map_hammer_test(data: Any, mapping: HammerTestMapping) -> HammerTest:
     `hammer_test`.
     """
     channels, factors = in_si(mapping.channels)
-    signs = np.array([-1.0 if channel.inverted else 1.0 for channel in mapping.channels])
+    signs = np.array([-channel.scale if channel.inverted else channel.scale for channel in mapping.channels])
     entries = entries_at(data, mapping.records, "records")
     records = [
         record * (factors * signs)[:, None]

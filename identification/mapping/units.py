@@ -1,14 +1,7 @@
 """Units that imported measurements may have: those of a force, a motion, a voltage or a ratio in `vibrolock.quantities`."""
 
 from identification.errors import IdentificationError
-from vibrolock.quantities import Quantity, quantity
-
-SIGNALS = ("m", "m/s", "m/s2", "N", "V", "1")
-"""SI units of the signals of a test."""
-_LISTED = (
-    *("m", "mm", "um", "in", "mil", "ft", "m/s", "mm/s", "in/s", "m/s2", "mm/s2", "in/s2", "g"),
-    *("N", "mN", "kN", "lbf", "kgf", "V", "mV", "1"),
-)
+from vibrolock.quantities import SIGNALS, USUAL, Quantity, quantity
 
 
 def _known(unit: str) -> Quantity | None:
@@ -17,7 +10,7 @@ def _known(unit: str) -> Quantity | None:
 
 
 UNITS: dict[str, tuple[str, float]] = {
-    name: (found.si, float(found.factor)) for name in _LISTED if (found := _known(name)) is not None
+    name: (found.si, float(found.factor)) for name in USUAL if (found := _known(name)) is not None
 }
 """SI unit of the usual units, and the factor to it; other spellings and prefixes are understood as well."""
 

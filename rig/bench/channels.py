@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from rig.bench.configuration import Configured
-from rig.bench.data_sheet import volts_per_unit
+from vibrolock.data_sheet import volts_per_unit
 from vibrolock.errors import InputError
 
 if TYPE_CHECKING:

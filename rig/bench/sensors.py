@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 
 from rig.bench.channels import DATE, check_day
 from rig.bench.configuration import Configured, Table, read_toml, validated
-from rig.bench.data_sheet import volts_per_unit
 from rig.errors import ConfigurationError
+from vibrolock.data_sheet import volts_per_unit
 from vibrolock.errors import InputError
 from vibrolock.printable import shown
 

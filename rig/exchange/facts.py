@@ -33,8 +33,6 @@ class Use:
     """Unit that the mapping says; empty if it says none."""
     file: str = ""
     """Name of the further file that holds it; empty for the one that is imported."""
-    any_unit: bool = False
-    """Whether it may have a unit that is not understood, as a monitor."""
     rescaled: bool = False
     """Whether the mapping makes another quantity of it."""
     stored: bool = False
@@ -143,25 +141,31 @@ def _check(use: Use, data: FileData) -> None:
     given = data.unit(use.path)
     if not says_a_unit(given) or use.rescaled or (use.amplitude and given.strip().lower().startswith("db")):
         return
-    of_file, of_mapping = quantity(given), quantity(use.unit)
     if use.where == "time":
-        if seconds_in(given) is None or (use.unit and seconds_in(use.unit) != seconds_in(given)):
-            raise ImportFailed(
-                f"the file's own unit of the instants is '{given}'",
-                field="time_unit",
-                value=use.unit or "s",
-                hint="write that, or `against_file = true` if the file is wrong",
-            )
+        _check_time(use, given)
         return
+    of_file, of_mapping = quantity(given), quantity(use.unit)
     if not use.unit or given in (use.unit, use.or_unit) or (of_file is not None and of_file == of_mapping):
         return
     if of_file is not None and use.or_unit and of_file == quantity(use.or_unit):
         return
-    reason = f"the file's own units make it {given}; write that"
-    hint = "or `against_file = true` in the channel if the file is wrong"
-    if of_file is None or (of_mapping is not None and of_file.exponents != of_mapping.exponents):
-        reason, hint = f"the file's own units make it {given}", f"give the factor from {given} by `scale`, {hint}"
+    reason, hint = f"the file's own units make it {given}", "`against_file = true` in the channel if the file is wrong"
+    if of_file is not None and of_mapping is not None and of_file.exponents == of_mapping.exponents:
+        reason += "; write that"
+    else:
+        hint = f"give the factor from {given} by `scale`, or {hint}"
     raise ImportFailed(reason, field=use.where, value=use.unit, hint=hint)
+
+
+def _check_time(use: Use, given: str) -> None:
+    seconds = seconds_in(given)
+    if seconds is None or (use.unit and seconds_in(use.unit) != seconds):
+        raise ImportFailed(
+            f"the file's own unit of the instants is '{given}'",
+            field="time_unit",
+            value=use.unit or "s",
+            hint="write that, or `against_file = true` with the right `time_unit` if the file is wrong",
+        )
 
 
 def _uses(mapping: "BaseModel") -> Iterator[Use]:
@@ -189,7 +193,7 @@ def _uses(mapping: "BaseModel") -> Iterator[Use]:
 def _of_channel(channel: Any) -> Iterator[Use]:
     where, value = f"channels.{channel.name}", channel.value
     unit, stored = channel.unit, channel.against_file
-    about = {"file": getattr(channel, "file", ""), "any_unit": channel.role == "monitor", "stored": stored}
+    about = {"file": getattr(channel, "file", ""), "stored": stored}
     rescaled = getattr(channel, "scale", 1.0) != 1.0
     if isinstance(value, str):
         yield Use(f"{where}.unit", value, unit, rescaled=rescaled, **about)

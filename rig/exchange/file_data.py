@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mapping import SIGNALS
 from vibrolock.arrays import Float
-from vibrolock.quantities import quantity
+from vibrolock.quantities import SIGNALS, quantity
 
 _IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]$")
 _IN_NAMES = (*SIGNALS, "s")

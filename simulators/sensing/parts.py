@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from simulators.part import NotNegative, Part, Positive
+from vibrolock.data_sheet import volts_per_unit
 from vibrolock.errors import InputError
 
 TAPS = 6
@@ -32,7 +33,7 @@ class Sensor(Part):
     at: str | None = None
     """Name of the point whose acceleration is measured; a force sensor measures the force of the stinger."""
     sensitivity_v_per_unit: Annotated[float, Field(gt=0.0)]
-    """Sensitivity, V/N or V/(m/s^2)."""
+    """Sensitivity, V/N or V/(m/s^2); or give ``sensitivity`` in its place, as on a data sheet: ``10 mV/g``, ``22.4 mV/N``."""
     range_v: Positive
     """Largest voltage it can put out; beyond, it clips and is flagged."""
     noise_rms: NotNegative = 0.0
@@ -43,6 +44,27 @@ class Sensor(Part):
     """Corner of its first-order low-pass; 0 for none."""
     skew_samples: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of its readings behind those of the other channels, in samples of the converter."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_data_sheet(cls, table: object) -> object:
+        """Return the table with the sensitivity of a data sheet in volts per unit."""
+        if not isinstance(table, dict) or "sensitivity" not in table:
+            return table
+        text, given = table["sensitivity"], table.get("sensitivity_v_per_unit")
+        if not isinstance(text, str) or given is not None:
+            allowed = "one of the two" if given is not None else "a text with number and unit, such as '10 mV/g'"
+            raise InputError(
+                "beside sensitivity_v_per_unit" if given is not None else "",
+                field="sensitivity",
+                value=text,
+                allowed=allowed,
+            )
+        volts, unit = volts_per_unit(text)
+        wanted = "N" if table.get("kind") == "force" else "m/s^2"
+        if unit != wanted:
+            raise InputError(f"is per {unit}", field="sensitivity", value=text, allowed=f"one per {wanted}")
+        return {**{key: one for key, one in table.items() if key != "sensitivity"}, "sensitivity_v_per_unit": volts}
 
     @model_validator(mode="after")
     def _placed(self) -> "Sensor":

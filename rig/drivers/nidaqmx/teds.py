@@ -4,9 +4,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from rig.drivers.nidaqmx.library import Session
-
-NEWTONS_PER_POUND = 4.4482216152605
-"""A pound of force, N (BIPM, The International System of Units)."""
+from vibrolock.quantities import POUND_N
 
 
 class TedsSensor(NamedTuple):
@@ -61,4 +59,4 @@ def _sensitivity(session: Session, channel: str, is_force: bool) -> str:
             return f"{made.ai_accel_sensitivity:.6g} {per}"
         value = float(made.ai_force_iepe_sensor_sensitivity)
         in_pounds = made.ai_force_iepe_sensor_sensitivity_units.name == "MILLIVOLTS_PER_POUND"
-        return f"{value / (NEWTONS_PER_POUND if in_pounds else 1.0):.6g} mV/N"
+        return f"{value / (POUND_N if in_pounds else 1.0):.6g} mV/N"

@@ -17,6 +17,7 @@ from rig.emulator.nidaqmx.devices import Device
 from rig.emulator.nidaqmx.errors import NiError
 from rig.emulator.nidaqmx.task import DEFAULTS, Task, Value
 from rig.emulator.nidaqmx.tasks import Tasks
+from vibrolock.quantities import GRAVITY_M_S2
 
 VERSION = {"NIDAQ_MAJOR_VERSION": 24, "NIDAQ_MINOR_VERSION": 8, "NIDAQ_UPDATE_VERSION": 0}
 """Version of NI-DAQmx that is reported; from 24.5 on the client asks fewer questions."""
@@ -24,8 +25,6 @@ TEDS_SERIAL = 1000
 """Serial number of the first sensor with TEDS."""
 MANUFACTURERS = {"PCB": 18}
 """Numbers of manufacturers in IEEE 1451.4."""
-G_M_S2 = 9.80665
-"""Standard gravity, m/s^2: TEDS states sensitivities by g."""
 PSEUDO_DIFFERENTIAL, DIFFERENTIAL = 8, 4
 """Bits of terminal configurations, as in NI-DAQmx."""
 
@@ -159,7 +158,7 @@ class Facts:
             )
         if is_force:
             return 1000.0 * sensor.sensitivity_v_per_unit, ForceIEPESensorSensitivityUnits.MILLIVOLTS_PER_NEWTON.value
-        return 1000.0 * sensor.sensitivity_v_per_unit * G_M_S2, AccelSensitivityUnits.MILLIVOLTS_PER_G.value
+        return 1000.0 * sensor.sensitivity_v_per_unit * GRAVITY_M_S2, AccelSensitivityUnits.MILLIVOLTS_PER_G.value
 
     def of_channel(self, tasks: Tasks, task: Task, channel: str, name: str) -> Value:
         """An attribute of a channel of a task; of the first one if several are meant."""

@@ -53,7 +53,7 @@ def _unread(values: NDArray[np.generic], of: Mapping[str, Value]) -> Iterator[st
     """Yield in words what cannot be followed."""
     for key in ("scale_factor", "add_offset"):
         if key in of and _number(of[key]) is None:
-            yield f"has {key} {of[key]}, which is no number"
+            yield f"has {key} {of[key]!r}, which is no number"
     if str(of.get("_Unsigned", "")).lower() == "true" and values.dtype.kind == "i":
         yield "is marked _Unsigned, but stored with a sign"
     for key in _MISSING:
@@ -62,7 +62,8 @@ def _unread(values: NDArray[np.generic], of: Mapping[str, Value]) -> Iterator[st
             if count and not (missing != missing and values.dtype.kind in "biu"):
                 yield f"has {count} missing values ({key} {missing})"
     low, high = _limits(of)
-    if count := int(np.count_nonzero((values < low) | (values > high))):
+    numbers = values.astype(np.float64)
+    if count := int(np.count_nonzero((numbers < low) | (numbers > high))):
         yield f"has {count} values outside its valid range, {low:g} to {high:g}"
 
 

@@ -7,12 +7,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Literal, get_args
 
-from identification import IdentificationError
-from identification.mapping import CsvLayout, si_of
+from identification.mapping import CsvLayout
 from identification.mapping.time_data import Encoding
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.tables.rows import cells_of
 from rig.exchange.tables.text import blocks, encoding_of, table_lines
+from vibrolock.quantities import quantity
 
 _EXAMINED_LINES = 100  # lines that are examined at the beginning and at the end; chosen
 _EQUAL_ROWS = 3  # rows of equally many numbers that make a table; chosen
@@ -24,7 +24,6 @@ _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$"),
 }
-_TIMES = ("s", "sec", "ms", "us", "Hz")  # units of the first column, beside those of signals
 
 
 def guessed_layout(path: Path) -> CsvLayout | None:
@@ -107,14 +106,7 @@ def _lines_after(path: Path, encoding: str, separator: str, decimal: str, shape:
 
 
 def _has_unit(line: str, separator: str) -> bool:
-    return any(_is_unit(cell.strip("[]() ")) for cell in _cells(line, separator))
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        return text in _TIMES or bool(text and si_of(text, ""))
-    except IdentificationError:
-        return False
+    return any(quantity(cell) is not None for cell in _cells(line, separator))
 
 
 def _names(line: str, separator: str, width: int) -> bool:

@@ -8,10 +8,10 @@ from rig.arming.arming import armed
 from rig.bench import Bench, load_bench
 from rig.bench.bench import shipped_benches
 from rig.bench.configuration import validated
-from rig.bench.data_sheet import volts_per_unit
 from rig.bench.sensors import Sensor
 from rig.errors import ConfigurationError, NotArmed
 from tests.refused import refused
+from vibrolock.data_sheet import volts_per_unit
 
 G = 9.80665  # m/s2, standard gravity
 
