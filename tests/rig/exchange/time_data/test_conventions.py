@@ -32,6 +32,8 @@ PAGE = Path(__file__).parents[4] / "docs" / "reference" / "exchange.md"
 N = 64
 VALUES = np.round(np.random.default_rng(3).normal(0.0, 1.0, (2, N)), 6)
 GRAVITY, POUND, INCH = 9.80665, 4.4482216152605, 0.0254  # m/s2, N, m
+UNEVEN = np.arange(N) ** 1.3 / 2048.0
+WITH_NAN = np.where(np.arange(N) == 5, np.nan, VALUES[0])
 UNITS = {"N": 1.0, "kN": 1e3, "lbf": POUND, "Newtons": 1.0, "mN": 1e-3}
 MOTIONS = {"g": GRAVITY, "m/s²": 1.0, "m/s/s": 1.0, "mm/s^2": 1e-3, "in/s2": INCH, "ms-2": 1.0}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "milliseconds": 1e-3}
@@ -233,6 +235,89 @@ def sep005_starts(path: Path, of: Case) -> Case:
     return _sep005(path, of, start_timestamp=f"2026-03-01T12:00:00.{round(1e6 * of['late'] / 5000.0):06d}+00:00")
 
 
+def sep005_starts_between_samples(path: Path, of: Case) -> Case:
+    return _sep005(path, of, start_timestamp="2026-03-01T12:00:00.100000+00:00")
+
+
+def _sep005_over_time(path: Path, of: Case, instants: Any) -> Case:
+    units = {"F": of["force"], "a": of["motion"]}
+    series = [
+        {"name": name, "unit_str": unit, "data": v.tolist(), "time": instants.tolist()}
+        for (name, unit), v in zip(units.items(), VALUES, strict=True)
+    ]
+    path.write_text(json.dumps(series))
+    return {**of, "paths": ("F", "a"), "in_si": True}
+
+
+def sep005_rounded(path: Path, of: Case) -> Case:
+    return _sep005_over_time(path, of, np.round(np.arange(N) / of["rate"], 6))
+
+
+def sep005_uneven(path: Path, of: Case) -> Case:
+    return _sep005_over_time(path, of, UNEVEN)
+
+
+def mdf_starts_between_samples(path: Path, of: Case) -> Case:
+    return _mdf(path, of, VALUES[0], late=0.4)
+
+
+def mdf_rounded(path: Path, of: Case) -> Case:
+    return _mdf(path, of, VALUES[0], t=np.round(np.arange(N) / of["rate"], 6))
+
+
+def hdf5_single(path: Path, of: Case) -> Case:
+    return _retimed(hdf5_units, path, {**of, "time": "s"}, (np.arange(N) / of["rate"]).astype(np.float32))
+
+
+def hdf5_uneven(path: Path, of: Case) -> Case:
+    return _retimed(hdf5_units, path, of, UNEVEN)
+
+
+def _retimed(write: "Writer", path: Path, of: Case, instants: Any) -> Case:
+    told = write(path, of)
+    with h5py.File(path, "a") as file:
+        unit = file["x/t"].attrs["units"]
+        del file["x/t"]
+        file["x/t"] = instants
+        file["x/t"].attrs["units"] = unit
+    return told
+
+
+def mat_uneven(path: Path, of: Case) -> Case:
+    scipy.io.savemat(path, {"F": VALUES[0], "a": VALUES[1], "t": UNEVEN})
+    return {**_plain(of), "paths": ("F", "a"), "more": 'time = "t"'}
+
+
+def mat_not_a_number(path: Path, of: Case) -> Case:
+    scipy.io.savemat(path, {"F": WITH_NAN, "a": VALUES[1], "t": _instants(of), "units": {"t": of["time"]}})
+    return {**_plain(of), "paths": ("F", "a"), "more": 'time = "t"'}
+
+
+def mat_instant_not_a_number(path: Path, of: Case) -> Case:
+    scipy.io.savemat(path, {"F": VALUES[0], "a": VALUES[1], "t": np.where(np.arange(N) == 5, np.nan, UNEVEN)})
+    return {**_plain(of), "paths": ("F", "a"), "more": 'time = "t"'}
+
+
+def csv_uneven(path: Path, of: Case) -> Case:
+    np.savetxt(path, np.c_[UNEVEN, VALUES.T], delimiter=",", header="t,F,a", comments="")
+    return {**_plain(of), "paths": ("F", "a"), "more": 'time = "t"'}
+
+
+def csv_not_a_number(path: Path, of: Case) -> Case:
+    np.savetxt(path, np.c_[np.arange(N) / 100.0, WITH_NAN, VALUES[1]], delimiter=",", header="t,F,a", comments="")
+    return {**_plain(of), "paths": ("F", "a"), "more": 'time = "t"'}
+
+
+def tdms_not_a_number(path: Path, of: Case) -> Case:
+    return _tdms(path, of, WITH_NAN)
+
+
+def sep005_not_a_number(path: Path, of: Case) -> Case:
+    told = _sep005(path, of)
+    path.write_text(path.read_text().replace(str(VALUES[0][5]), "NaN", 1))
+    return told
+
+
 Writer = Callable[[Path, Case], Case]
 USED: dict[tuple[str, str], tuple[Writer, ...]] = {
     ("MAT", "units"): (mat_units,), ("MAT", "unit of time"): (mat_units,), ("MAT", "rounded instants"): (mat_single,),
@@ -242,6 +327,9 @@ USED: dict[tuple[str, str], tuple[Writer, ...]] = {
     ("HDF5", "scale, offset"): (hdf5_scaled, hdf5_by_dots),
     ("TDMS", "units"): (tdms_units,), ("TDMS", "unit of time"): (tdms_units,), ("TDMS", "scale, offset"): (tdms_scaled,),
     ("TDMS", "start time"): (tdms_starts,),
+    ("HDF5", "rounded instants"): (hdf5_single,), ("MDF 4", "rounded instants"): (mdf_rounded,),
+    ("SEP005", "rounded instants"): (sep005_rounded,),
+    ("MAT", "start time"): (mat_units,), ("CSV", "start time"): (csv_units,), ("HDF5", "start time"): (hdf5_units,),
     ("MDF 4", "units"): (mdf_units,), ("MDF 4", "scale, offset"): (mdf_scaled,), ("MDF 4", "start time"): (mdf_starts,),
     ("SEP005", "units"): (sep005_units,), ("SEP005", "start time"): (sep005_starts,),
 }  # fmt: skip
@@ -254,6 +342,19 @@ REFUSED: dict[tuple[str, str], tuple[tuple[Writer, str], ...]] = {
     ("TDMS", "scale, offset"): ((tdms_unknown_scale, "is scaled by Fantasy, which npTDMS does not know"),),
     ("TDMS", "start time"): ((tdms_starts_between_samples, "begins 204.80 samples before another"),),
     ("MDF 4", "scale, offset"): ((mdf_formula, "is converted by a formula, which is not evaluated"),),
+    ("MDF 4", "start time"): ((mdf_starts_between_samples, "samples before another"),),
+    ("SEP005", "start time"): ((sep005_starts_between_samples, "begins 204.80 samples before another"),),
+    ("SEP005", "uneven instants"): ((sep005_uneven, "allowed are evenly spaced instants"),),
+    ("HDF5", "uneven instants"): ((hdf5_uneven, "is not evenly spaced"),),
+    ("CSV", "uneven instants"): ((csv_uneven, "is not evenly spaced"),),
+    ("MAT", "uneven instants"): ((mat_uneven, "is not evenly spaced"),),
+    ("MAT", "missing, invalid"): (
+        (mat_not_a_number, "value at [5] is nan"),
+        (mat_instant_not_a_number, "instant [5] is nan"),
+    ),
+    ("CSV", "missing, invalid"): ((csv_not_a_number, "value at [5] is nan"),),
+    ("TDMS", "missing, invalid"): ((tdms_not_a_number, "value at [5] is nan"),),
+    ("SEP005", "missing, invalid"): ((sep005_not_a_number, "value at [5, 0] is nan"),),
     ("MDF 4", "uneven instants"): ((mdf_uneven, "is not evenly sampled; resample it"),),
     ("MDF 4", "missing, invalid"): ((mdf_invalid, "has 1 samples that are marked as invalid"),),
 }
@@ -379,7 +480,9 @@ def matrix() -> dict[tuple[str, str], str]:
 
 def test_the_matrix_on_the_page_has_a_case_for_every_cell_that_this_file_knows():
     cells = {key: cell for key, cell in matrix().items() if key[0] in ENDINGS}
-    tested = {key: ("used" if key in USED else "") + ("refused" if key in REFUSED else "") for key in {*USED, *REFUSED}}
-    for key, said in tested.items():
-        for word in ("used", "refused"):
-            assert (word in cells[key]) == (word in said), (key, cells[key])
+    assert {kind for kind, _ in cells} == {*ENDINGS}
+    for key, said in cells.items():
+        assert re.match("used|refused|–$", said), key
+        assert bool(re.search(r"\bused", said)) == (key in USED), (key, said)
+        assert ("refused" in said) == (key in REFUSED), (key, said)
+    assert {*USED, *REFUSED} <= {*cells}
