@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from identification.mapping.instants import EvenSampling as EvenSampling, even_sampling as even_sampling
     from identification.mapping.time_data import (
         CsvLayout as CsvLayout,
+        Encoding as Encoding,
         SampledChannel as SampledChannel,
         Stretch as Stretch,
     )

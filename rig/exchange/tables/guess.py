@@ -7,8 +7,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Literal, get_args
 
-from identification.mapping import CsvLayout
-from identification.mapping.time_data import Encoding
+from identification.mapping import CsvLayout, Encoding
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.tables.rows import cells_of
 from rig.exchange.tables.text import blocks, encoding_of, table_lines
