@@ -88,6 +88,15 @@ def pnlss() -> Iterator[Ratio]:
             yield Ratio(f"plain numpy, {size}, {threads}", "PNLSS iteration", found["times_plain_numpy"])
 
 
+def tables() -> Iterator[Ratio]:
+    """Reading a large CSV file, as whole processes."""
+    found = _json("benchmarks.tables", "--json")
+    base = found.pop("numpy.loadtxt")
+    for name, one in found.items():
+        yield Ratio(f"CSV of 60 MB, {name}", "numpy.loadtxt, processor time", one["processor_s"] / base["processor_s"])
+        yield Ratio(f"CSV of 60 MB, {name}", "numpy.loadtxt, memory", one["memory_bytes"] / base["memory_bytes"])
+
+
 def wall_clock(minutes: float) -> Iterator[Ratio]:
     """Lateness of the loop by the clock."""
     rates = ("--rate", "2000", "--rate", "5000")
@@ -134,7 +143,7 @@ def put(page: Path, text: str) -> None:
 
 def main(minutes: float = 0.0, page: Path | None = None) -> None:
     """Measure all ratios, with ``minutes`` of the loop by the clock at each rate; print them, and put them into a page."""
-    parts: list[Callable[[], Iterator[Ratio]]] = [commands, loop, pnlss]
+    parts: list[Callable[[], Iterator[Ratio]]] = [commands, loop, pnlss, tables]
     if minutes > 0.0 and shutil.which("cyclictest"):
         parts.append(partial(wall_clock, minutes))
     ratios: list[Ratio] = []

@@ -9,12 +9,17 @@ from rig.cli.options import Json, Output, Overwrite, keep_existing, show_file
 
 
 def import_(
-    file: Annotated[Path, typer.Argument(help="MAT, UFF, CSV, HDF5, WAV, TDMS, MDF 4 or SEP005 file.")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="MAT, UFF, CSV, Excel, HDF5, NetCDF, NumPy, LabVIEW, WAV, TDMS, MDF 4 or SEP005 file."),
+    ],
     output: Output,
     mapping: Annotated[Path | None, typer.Option(help="TOML file that says what is where in it.")] = None,
     format_: Annotated[
         str,
-        typer.Option("--format", help="mat, uff, csv, hdf5, wav, tdms, mdf4 or sep005; by the file's ending."),
+        typer.Option(
+            "--format", help="mat, uff, csv, hdf5, wav, tdms, mdf4, lvm, npz, xlsx or sep005; by the file's ending."
+        ),
     ] = "",
     units: Annotated[str, typer.Option(help="UFF with unclear units: labels, file (dataset 164) or si.")] = "",
     drive: Annotated[str, typer.Option(help="UFF with modes: where the force acts, such as 1+Z.")] = "",

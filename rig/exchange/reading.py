@@ -46,7 +46,8 @@ def import_file(
     path
         The file. Further files that a mapping of time data names are beside it.
     format_
-        ``mat``, ``uff``, ``csv``, ``hdf5``, ``wav``, ``tdms``, ``mdf4`` or ``sep005``; by the suffix of ``path`` if empty.
+        ``mat``, ``uff``, ``csv``, ``hdf5``, ``wav``, ``tdms``, ``mdf4``, ``lvm``, ``npz``, ``xlsx`` or ``sep005``; by the
+        suffix of ``path`` if empty.
     mapping
         TOML file that describes the contents. Required unless this package wrote the file, or it is a universal file with
         frequency responses or modes.

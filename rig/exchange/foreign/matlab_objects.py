@@ -32,7 +32,7 @@ def opaque_in(variables: Mapping[str, Value]) -> dict[str, str]:
     """Return the names of the objects that SciPy found, without reading them, and their classes; and where SciPy puts them."""
     from scipy.io.matlab import MatlabOpaque
 
-    found = {}
+    found: dict[str, str] = {}
     for key, value in variables.items():
         if isinstance(value, MatlabOpaque):
             name, kind = (np.ravel(value)[0][at].decode("latin-1") for at in ("s0", "s2"))

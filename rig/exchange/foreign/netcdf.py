@@ -7,9 +7,10 @@ direction (its ``components/streaming.py``).
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.exchange.child_values import TooMuchData, most_bytes
 from rig.exchange.file_data import ChannelFacts, Value
@@ -24,10 +25,11 @@ def read_classic(path: Path) -> dict[str, Value]:
     from scipy.io import netcdf_file
 
     most = most_bytes(path)
+    file: Any
     with netcdf_file(str(path), "r", mmap=False, maskandscale=False) as file:
         found: dict[str, Value] = dict(_attributes("", file._attributes))
         for name, variable in file.variables.items():
-            values = np.asarray(variable[:])
+            values: NDArray[Any] = np.asarray(variable[:])
             most -= values.nbytes
             if most < 0:
                 raise TooMuchData(most_bytes(path))

@@ -6,6 +6,7 @@ Both give the same numbers, those that are nearest to what is printed.
 import csv
 import io
 import warnings
+from array import array
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,8 +54,20 @@ class Columns:
         quick = self._quick(block)
         if quick is not None:
             return quick
-        found = [row for number, line in enumerate(block.split("\n"), first) if (row := self.row(line, number))]
-        return np.array(found, np.float64).reshape(-1, len(self.numeric))
+        found = array("d")
+        for number, line in enumerate(block.split("\n"), first):
+            found.extend(self._plain(line) or self.row(line, number))
+        return np.array(found).reshape(-1, len(self.numeric))
+
+    def _plain(self, line: str) -> list[float]:
+        """Return the numbers in a line that holds nothing else; empty for any other line."""
+        cells = line.split(self.separator) if self.separator != " " else line.split()
+        if len(cells) != len(self.names) or self.texts:
+            return []
+        try:
+            return [*map(float, cells if self.decimal == "." else [cell.replace(",", ".") for cell in cells])]
+        except ValueError:
+            return []
 
     def row(self, line: str, number: int) -> list[float]:
         """Return the numbers in a line; empty for a comment, an empty line, or one of the heading."""
