@@ -59,7 +59,7 @@ def test_dimensions_are_told_by_what_repeats_and_what_grows():
             ("ch7", "lbf", "force"),
         ),
         *(("acc_tip", "", "motion"), ("x", "", "motion"), ("y1", "", "motion"), ("ch1", "g", "motion")),
-        *(("voltage", "", "monitor"), ("ch3", "V", "monitor"), ("speed", "rpm", ""), ("ch", "", "")),
+        *(("voltage", "", "monitor"), ("ch3", "V", "monitor"), ("speed", "rpm", "monitor"), ("ch", "", "")),
     ],
 )
 def test_roles_are_guessed_by_unit_and_name(name, unit, role):
