@@ -149,11 +149,14 @@ def _check(use: Use, data: FileData) -> None:
         return
     if of_file is not None and use.or_unit and of_file == quantity(use.or_unit):
         return
-    reason, hint = f"the file's own units make it {given}", "`against_file = true` in the channel if the file is wrong"
+    reason, hint = (
+        f"the file's own units make it {given}",
+        "or `against_file = true` in the channel if the file is wrong",
+    )
     if of_file is not None and of_mapping is not None and of_file.exponents == of_mapping.exponents:
         reason += "; write that"
     else:
-        hint = f"give the factor from {given} by `scale`, or {hint}"
+        hint = f"give the factor from {given} by `scale`, {hint}"
     raise ImportFailed(reason, field=use.where, value=use.unit, hint=hint)
 
 
