@@ -96,7 +96,7 @@ def _advised(error: RowFailed, columns: Columns, found: Blocks) -> ImportFailed:
     """Return the error, with what to do if all lines from this one to the end are few, and no rows of numbers."""
     count = 0
     for number, line in table_lines(found):
-        if number < error.line:
+        if number < error.at_line:
             continue
         try:
             if columns.row(line, number):

@@ -22,7 +22,7 @@ class RowFailed(ImportFailed):
     def __init__(self, line: int, column: str, what: str) -> None:
         where = f"line {line}, column '{column}'" if column else f"line {line}"
         super().__init__(f"{where}: {what}")
-        self.line = line
+        self.at_line = line
         """Number of the line, from 1."""
 
 
