@@ -5,8 +5,10 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.exchange.child_values import TooMuchData, most_bytes
 from rig.exchange.file_data import FileData, Value, from_variables
@@ -31,7 +33,7 @@ def read_npz(path: Path) -> FileData:
     return from_variables(values, _units(values))
 
 
-def _plain(array: "np.ndarray") -> Value:  # type: ignore[type-arg]
+def _plain(array: NDArray[Any]) -> Value:
     if array.dtype.names:
         return {name: _plain(array[name]) for name in array.dtype.names}
     if array.dtype.kind in "US":
