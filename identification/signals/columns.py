@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.signals.chunks import Line, Phase, Record, spans
+from identification.signals.turns import turns_of
 from identification.validation import finite
 from vibrolock.arrays import Float
 
@@ -20,7 +21,7 @@ class Stretch(NamedTuple):
     theta: Float
     """float[n], without ripple."""
     design: Float
-    """float[n, 2 H + 3]."""
+    """float[n, 2 H + 4]."""
     data: Float
     """float[n, n_channels]."""
     lost: NDArray[np.bool_]
@@ -69,14 +70,14 @@ class Columns:
         return Stretch(theta, design, finite("samples", samples).T, lost)
 
     def _repeating(self, start: int, stop: int) -> Float:
-        """float[stop - start, 2 H]: harmonics of a phase that advances uniformly."""
+        """float[stop - start, 2 H + 1]: harmonics of a phase that advances uniformly, without a constant."""
         if self._columns is None or self._columns[:2] != (start, stop):
             columns = _design(self._straight.read(start, stop), self._harmonics)
-            self._columns = start, stop, columns[:, 1 : 2 * self._harmonics + 1]
+            self._columns = start, stop, columns[:, 1:-2]
         return self._columns[2]
 
     def _ripple(self) -> Float:
-        """float[2 H]: the part of the phase that repeats within every period.
+        """float[2 H + 1]: the part of the phase that repeats within every period.
 
         It is fitted to the deviation of the phase from its moving mean over one period, so that slow variations remain.
         """
@@ -111,23 +112,19 @@ def least_squares(normal: Float, right: Float) -> Float:
 
     Columns of zeros get a coefficient of zero.
     """
-    return np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0])
+    solution = np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0])
+    solution[~normal.any(axis=0)] = 0.0
+    return solution
 
 
 def _design(theta: Float, harmonics: int, position: Float | None = None) -> Float:
-    """float[n, 2 H + 3]: 1, cosines and minus sines (for Re and Im of Y_h), and the drift of the fundamental.
+    """float[n, 2 H + 4]: cosines and minus sines (for Re and Im of Y_h, h from 0 up), and the drift of the fundamental.
 
     ``position`` in the record goes from -1/2 to 1/2. Without it the drift is left out (its columns are zero), as below four
     periods, where it cannot be separated from the harmonics.
     """
-    columns = np.zeros((2 * harmonics + 3, theta.size))
-    columns[0] = 1.0
-    power = rotation = np.exp(1j * theta)
-    for harmonic in range(1, harmonics + 1):
-        columns[harmonic] = power.real
-        columns[harmonics + harmonic] = -power.imag
-        power = power * rotation
+    columns = np.zeros((2 * harmonics + 4, theta.size))
+    turns = turns_of(theta, harmonics, columns[:-2].reshape(2, harmonics + 1, theta.size))
     if position is not None:
-        columns[-2] = position * rotation.real
-        columns[-1] = -position * rotation.imag
+        np.multiply(position, turns[:, 1], out=columns[-2:])
     return columns.T

@@ -23,7 +23,8 @@ from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
 from identification.signals.chunks import ArrayRecord, Phase, Record, check_samples
 from identification.signals.columns import Columns, least_squares
-from identification.signals.rounding import JUDGED, part_of_each, rounding_errors, turns_of
+from identification.signals.rounding import JUDGED, part_of_each, rounding_errors
+from identification.signals.turns import turns_of
 from identification.validation import finite_array, positive
 from vibrolock.arrays import Complex, Float
 
@@ -128,12 +129,10 @@ def vibration_in(
     chunks = Columns(record, phase, count, harmonics, many=periods >= _MIN_BATCHES)
     solution, kept = _solved(chunks)
     squares, rough, means = _residual(chunks, solution, periods)
-    coefficients = np.empty((len(channels), harmonics + 1), dtype=np.complex128)
-    coefficients[:, 0] = solution[0]
-    coefficients[:, 1:] = (solution[1 : harmonics + 1] + 1j * solution[harmonics + 1 : -2]).T
+    coefficients = np.asarray((solution[: harmonics + 1] + 1j * solution[harmonics + 1 : -2]).T)
     drift = solution[-2] + 1j * solution[-1]
     residual_rms = np.sqrt(squares / kept)
-    scatter = _standard_errors(squares, means, kept, periods, 2 * harmonics + 1)
+    scatter = _standard_errors(squares, means, kept, periods, harmonics)
     steps = _per_channel("resolution", resolution, len(channels))
     seen_rms = np.sqrt(np.maximum(np.minimum(rough, squares) / kept - steps**2 / 12.0, 0.0))
     known_rms = _per_channel("noise_rms", noise_rms, len(channels))
@@ -206,7 +205,7 @@ def _whole_periods(phase: Phase, size: int, rate_hz: float, harmonics: int) -> t
 
 
 def _solved(chunks: Columns) -> tuple[Float, int]:
-    """Return the solution of least squares, float[2 H + 3, n_channels], and the number of samples behind it."""
+    """Return the solution of least squares, float[2 H + 4, n_channels], and the number of samples behind it."""
     normal: Float | float = 0.0
     right: Float | float = 0.0
     lost = 0
@@ -223,7 +222,7 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
     """Return sums of squares of the residual and of its white part, float[n_channels], and its coefficients batch by batch.
 
     The white part is that of third differences, which higher harmonics and slow variations hardly have. The coefficients are
-    float[n_batches, 2 H + 1, n_channels]; None below four periods.
+    float[n_batches, 2 H + 2, n_channels]; None below four periods.
     """
     columns = solution.shape[0] - 2
     batches = batches_of(periods) if periods >= _MIN_BATCHES else 0
@@ -248,7 +247,7 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
 
 
 def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[Float, Complex]:
-    """Return the phase of some samples, and the harmonics of the vibration there: more than are asked for.
+    """Return `turns_of` some samples, and the harmonics of the vibration there: more than are asked for.
 
     Rounding depends on the shape of a vibration to a fraction of a step, to which harmonics above H still contribute.
     """
@@ -257,8 +256,9 @@ def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[
     residual = chunk.data[:JUDGED] - chunk.design[:JUDGED] @ solution
     per_period = 2.0 * np.pi * (theta.size - 1) / (theta[-1] - theta[0])
     first, last = coefficients.shape[1], min(_SHAPE_HARMONICS, int(_BELOW_HALF * per_period))
-    turns = turns_of(theta, max(last, first - 1))[first:]
-    return theta, np.hstack([coefficients, (turns @ residual).conj().T * (2.0 / theta.size)])
+    turns = turns_of(theta, max(last, first - 1))
+    real, imaginary = turns[:, first:] @ residual
+    return turns, np.hstack([coefficients, (real + 1j * imaginary).T * (2.0 / theta.size)])
 
 
 def batches_of(periods: int) -> int:
@@ -266,17 +266,13 @@ def batches_of(periods: int) -> int:
     return min(_MAX_BATCHES, periods) if periods >= _MIN_BATCHES else _MANY
 
 
-def _standard_errors(squares: Float, means: Float | None, kept: int, periods: int, columns: int) -> Float:
+def _standard_errors(squares: Float, means: Float | None, kept: int, periods: int, harmonics: int) -> Float:
     """float[n_channels, H + 1]: standard error of Re and of Im of each coefficient; arguments as from `_residual`."""
-    harmonics = (columns - 1) // 2
+    twice = np.r_[1.0, np.full(harmonics, 2.0)]  # means of cosine and sine are half the amplitude
     if means is None:
-        variance = squares / max(kept - columns, 1)
-        white = np.sqrt(np.outer(variance, np.r_[1.0, np.full(harmonics, 2.0)]) / kept)
-        return np.asarray(white)
+        variance = squares / max(kept - 2 * harmonics - 1, 1)
+        return np.asarray(np.sqrt(np.outer(variance, twice) / kept))
     batches = batches_of(periods)
-    # Means of cosine and sine are half the amplitude; the residual's mean over the record is zero: batches - 1 are free.
+    # The residual's mean over the record is zero: batches - 1 are free.
     squared = np.sum(means**2, axis=0) / ((batches - 1) * batches)
-    result = np.empty((squares.size, harmonics + 1))
-    result[:, 0] = np.sqrt(squared[0])
-    result[:, 1:] = np.sqrt(2.0 * (squared[1 : harmonics + 1] + squared[harmonics + 1 :])).T
-    return result
+    return np.asarray(np.sqrt(twice * squared.reshape(2, harmonics + 1, -1).sum(axis=0).T))

@@ -21,6 +21,8 @@ from vibrolock.arrays import Complex, Float
 
 JUDGED = 16384
 """Number of samples of a record from which its rounding is judged; a longer record has no more of it."""
+_BLOCK = 1024
+"""Samples that are evaluated at once. Chosen: the errors of so many fit the cache of a core."""
 _ORDERS = 6
 """Orders of the harmonics of rounding that are summed, at most. Chosen."""
 _NEGLIGIBLE = 1e-3
@@ -32,26 +34,15 @@ _SPREAD = np.sqrt(0.5)
 part in quadrature depends on the shape besides, and is not reduced."""
 
 
-def turns_of(theta_rad: Float, highest: int) -> Complex:
-    """complex[highest + 1, n]: ``exp(i h theta)`` of the harmonics from 0 up, each from two lower ones."""
-    turns = np.empty((highest + 1, theta_rad.size), np.complex128)
-    turns[0] = 1.0
-    if highest:
-        turns[1] = np.exp(1j * theta_rad)
-    for order in range(2, highest + 1):
-        np.multiply(turns[order // 2], turns[order - order // 2], out=turns[order])
-    return turns
-
-
 def rounding_errors(
-    theta_rad: Float, harmonics: Complex, resolution: Float, noise_rms: Float, wanted: int | None = None
+    turns: Float, harmonics: Complex, resolution: Float, noise_rms: Float, wanted: int | None = None
 ) -> Complex:
     """Standard errors of each coefficient due to rounding: in phase with the coefficient (real), in quadrature (imaginary).
 
     Parameters
     ----------
-    theta_rad
-        float[n], phase of the vibration at every sample, whole periods.
+    turns
+        float[2, H + 1, n], `identification.signals.turns.turns_of` the phase at every sample, whole periods.
     harmonics
         complex[n_channels, H + 1], as measured; all that are a hundredth of a step or more.
     resolution
@@ -68,15 +59,14 @@ def rounding_errors(
     highest = harmonics.shape[1] - 1
     wanted = highest if wanted is None else wanted
     out = np.zeros((harmonics.shape[0], wanted + 1), np.complex128)
-    sizes = {row: _sizes(noise_rms[row] / resolution[row]) for row in np.flatnonzero(resolution > 0.0)}
-    rounded = [row for row, terms in sizes.items() if terms]
-    if rounded:
-        turns = turns_of(theta_rad, highest)
+    has_steps = np.flatnonzero(resolution > 0.0)
+    terms = _terms(noise_rms[has_steps] / resolution[has_steps])
+    rounded, terms = has_steps[terms[0] != 0.0], terms[:, terms[0] != 0.0]
+    if rounded.size:
         steps = harmonics[rounded] / resolution[rounded, None]
-        for row, of_channel, position in zip(rounded, steps, np.real(steps[:, 1:] @ turns[1:]), strict=True):
-            out[row] = resolution[row] * _of_a_channel(
-                of_channel[: wanted + 1], position, sizes[row], turns[: wanted + 1]
-            )
+        position = np.tensordot([steps[:, 1:].real, steps[:, 1:].imag], turns[:, 1:], axes=([0, 2], [0, 1]))
+        found = _coefficients(turns[:, : wanted + 1], position, terms)
+        out[rounded] = resolution[rounded, None] * _largest(found, steps[:, : wanted + 1])
     return out
 
 
@@ -85,35 +75,55 @@ def part_of_each(rounding: Complex) -> Float:
     return np.asarray(np.abs(rounding) / np.sqrt(2.0))
 
 
-def _sizes(noise_steps: float) -> list[float]:
-    """Sizes of the terms of the mean error in steps, with their signs, as long as they matter."""
-    sizes: list[float] = []
-    for order in range(1, _ORDERS + 1):
-        size = np.exp(-2.0 * (np.pi * order * noise_steps) ** 2) / (np.pi * order)
-        if size < _NEGLIGIBLE:
-            break
-        sizes.append(float((-1) ** order * size))
-    return sizes
+def _terms(noise_steps: Float) -> Float:
+    """float[orders, n_channels]: terms of the mean error in steps, with their signs, as long as they matter; then 0."""
+    orders = np.arange(1.0, _ORDERS + 1)[:, None]
+    sizes = np.exp(-2.0 * (np.pi * orders * noise_steps) ** 2) / (np.pi * orders)
+    return np.asarray(np.where(sizes < _NEGLIGIBLE, 0.0, (-1.0) ** orders * sizes))
 
 
-def _of_a_channel(steps: Complex, position: Float, sizes: list[float], turns: Complex) -> Complex:
-    """complex[W + 1]: standard errors in steps of a channel whose harmonics and position over time are given in steps.
+def _coefficients(turns: Float, position: Float, terms: Float) -> Complex:
+    """complex[n_channels, sizes, 2, W + 1]: Fourier coefficients of the error in steps, on a step and a quarter above.
 
-    ``turns``, complex[W + 1, n], are the harmonics of size 1 at every sample.
+    ``position``, float[n_channels, n], is the vibration in steps.
     """
-    peak = max(float(np.max(np.abs(position))), 1e-9)
+    peak = np.maximum(np.max(np.abs(position), axis=1), 1e-9)
+    sizes = np.maximum(1.0 + np.divide.outer(np.array(_SIZES), peak), 0.0)
+    sums = np.zeros((2 * sizes.size, 2 * turns.shape[1]))
+    for start in range(0, position.shape[1], _BLOCK):
+        block = slice(start, start + _BLOCK)
+        cosine, sine = _cosine_and_sine(sizes[..., None] * position[:, block])
+        # A quarter of a step above, the turn is a quarter farther.
+        errors = np.stack([_sine_series(cosine, sine, terms), _sine_series(-sine, cosine, terms)])
+        sums += errors.reshape(sums.shape[0], -1) @ turns[:, :, block].reshape(sums.shape[1], -1).T
+    found = (2.0 / position.shape[1]) * (sums[:, : turns.shape[1]] + 1j * sums[:, turns.shape[1] :])
+    found[:, 0] *= 0.5
+    return np.moveaxis(found.reshape(2, *sizes.shape, -1), 2, 0).swapaxes(1, 2)
+
+
+def _cosine_and_sine(turns: Float) -> tuple[Float, Float]:
+    """Cosine and sine of a number of turns: the sine of a quarter of the angle, within an eighth of a turn, gives both."""
+    sine = np.sin(0.5 * np.pi * (turns - np.rint(turns)))
+    squared = 2.0 * sine * sine
+    sine_of_half, cosine_of_half = 2.0 * sine * np.sqrt(1.0 - 0.5 * squared), 1.0 - squared
+    return 1.0 - 2.0 * sine_of_half**2, 2.0 * sine_of_half * cosine_of_half
+
+
+def _sine_series(cosine: Float, sine: Float, terms: Float) -> Float:
+    """``sum_n terms[n - 1] sin(n x)`` from cosine and sine of x (Clenshaw); ``terms`` is float[orders, n_channels]."""
+    double = 2.0 * cosine
+    above, last = np.zeros_like(cosine), np.zeros_like(cosine) + terms[-1, :, None]
+    for term in terms[-2::-1, :, None]:
+        np.subtract(term, above, out=above)
+        above += double * last
+        above, last = last, above
+    last *= sine
+    return last
+
+
+def _largest(found: Complex, steps: Complex) -> Complex:
+    """complex[n_channels, W + 1]: standard errors in steps from those of each size, in phase and in quadrature."""
     unit = np.divide(steps, np.abs(steps), out=np.ones_like(steps), where=steps != 0.0)
-    errors = np.zeros((2 * len(_SIZES), position.size))
-    for change, (on_a_step, between) in zip(_SIZES, errors.reshape(len(_SIZES), 2, -1), strict=True):
-        turn = first = np.exp(2j * np.pi * max(1.0 + change / peak, 0.0) * position)
-        for order, size in enumerate(sizes, 1):
-            if order > 1:
-                turn = turn * first
-            on_a_step += size * turn.imag
-            # A quarter of a step above, the turn of this order is i^n times as far.
-            between += (size, size, -size, -size)[order % 4] * (turn.real if order % 2 else turn.imag)
-    found = (turns @ errors.T).conj() * (2.0 / position.size)
-    found[0] *= 0.5
-    along = (found * np.conj(unit)[:, None]).reshape(steps.size, len(_SIZES), 2)
+    along = found * np.conj(unit)[:, None, None]
     in_phase, across = (np.max(np.sum(part**2, axis=2), axis=1) for part in (along.real, along.imag))
     return np.asarray(_SPREAD * np.sqrt(in_phase) + 1j * np.sqrt(across))

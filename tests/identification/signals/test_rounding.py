@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from identification import Channel, IdentificationError, periodic_vibration
-from identification.signals.rounding import part_of_each, rounding_errors, turns_of
+from identification.signals.rounding import part_of_each, rounding_errors
+from identification.signals.turns import turns_of
 from tests.refused import refused
 
 CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"))
@@ -34,7 +35,7 @@ def errors_seen(peak_steps: float, noise_steps: float, offsets: np.ndarray, thet
 
 def stated(peak_steps: float, noise_steps: float, theta: np.ndarray = THETA) -> np.ndarray:
     """Stated standard errors in steps, complex[3]."""
-    return rounding_errors(theta, peak_steps * HARMONICS[None], np.ones(1), np.array([noise_steps]))[0, 1:]
+    return rounding_errors(turns_of(theta, 3), peak_steps * HARMONICS[None], np.ones(1), np.array([noise_steps]))[0, 1:]
 
 
 @pytest.mark.parametrize(("peak_steps", "noise_steps"), [(9.6, 0.05), (9.6, 0.17), (3.3, 0.1)])
@@ -52,7 +53,7 @@ def test_a_sine_between_steps_has_an_error_of_amplitude_and_none_of_phase() -> N
     """The fundamental of ``sin(2 pi A cos(theta))`` is ``2 J_1(2 pi A)``: in phase, and of either sign."""
     sine = np.array([[0.0, 7.0, 0.0, 0.0]])
     in_phase, across = (
-        part(rounding_errors(THETA, sine, np.ones(1), np.zeros(1))[0, 1]) for part in (np.real, np.imag)
+        part(rounding_errors(turns_of(THETA, 3), sine, np.ones(1), np.zeros(1))[0, 1]) for part in (np.real, np.imag)
     )
     assert in_phase == pytest.approx(np.sqrt(0.5) * 2.0 / np.pi * np.sqrt(2.0 / (np.pi * 2.0 * np.pi * 7.0)), rel=0.4)
     assert across < 0.1 * in_phase
@@ -62,7 +63,7 @@ def test_instants_that_come_again_in_every_period_leave_more_than_instants_that_
     again = 2.0 * np.pi * np.arange(20 * 50) / 20.0
     across = np.array([[0.0, 300.0, 0.0, 0.0]])
     kept, spread = (
-        part_of_each(rounding_errors(theta, across, np.ones(1), np.zeros(1)))[0, 1]
+        part_of_each(rounding_errors(turns_of(theta, 3), across, np.ones(1), np.zeros(1)))[0, 1]
         for theta in (again, again * 20.0 / 20.617)
     )
     rounded = np.round(300.3 * np.cos(again))
@@ -73,8 +74,8 @@ def test_instants_that_come_again_in_every_period_leave_more_than_instants_that_
 
 def test_noise_of_half_a_step_leaves_nothing_of_it_and_no_step_is_no_rounding() -> None:
     peak = 9.6 * HARMONICS[None]
-    assert np.all(rounding_errors(THETA, peak, np.ones(1), np.array([0.6])) == 0.0)
-    assert np.all(rounding_errors(THETA, peak, np.zeros(1), np.array([0.0])) == 0.0)
+    assert np.all(rounding_errors(turns_of(THETA, 3), peak, np.ones(1), np.array([0.6])) == 0.0)
+    assert np.all(rounding_errors(turns_of(THETA, 3), peak, np.zeros(1), np.array([0.0])) == 0.0)
 
 
 def test_the_scatter_of_a_record_does_not_know_of_the_rounding_that_its_standard_error_counts() -> None:
@@ -107,7 +108,7 @@ def test_harmonics_beyond_those_asked_for_count_in_the_shape_but_are_not_returne
     assert found.rounding_std is not None
     assert found.rounding_std.shape == (2, 4)
     assert abs(found.harmonics[0, 1].imag) < 1.96 * np.hypot(found.rounding_std[0, 1].imag, found.harmonics_std[0, 1])
-    plain = rounding_errors(theta, np.array([[0.0, 9.6, 0.0, 0.0]]), np.ones(1), np.array([0.17]))[0, 1]
+    plain = rounding_errors(turns_of(theta, 3), np.array([[0.0, 9.6, 0.0, 0.0]]), np.ones(1), np.array([0.17]))[0, 1]
     assert found.rounding_std[0, 1].imag > 2.0 * plain.imag
 
 
@@ -120,6 +121,26 @@ def test_steps_and_noise_that_do_not_fit_are_named(name: str, values: list[float
 
 
 def test_turns_are_powers_of_the_first_and_lower_harmonics_alone_have_the_same_errors() -> None:
-    np.testing.assert_allclose(turns_of(THETA, 30), np.exp(1j * np.outer(np.arange(31), THETA)), atol=1e-11)
-    given = THETA, 9.6 * HARMONICS[None], np.ones(1), np.array([0.05])
+    angles = np.outer(np.arange(31), THETA)
+    np.testing.assert_allclose(turns_of(THETA, 30), [np.cos(angles), -np.sin(angles)], atol=1e-11)
+    given = turns_of(THETA, 3), 9.6 * HARMONICS[None], np.ones(1), np.array([0.05])
     np.testing.assert_allclose(rounding_errors(*given, 2), rounding_errors(*given)[:, :3], rtol=1e-12)
+
+
+@pytest.mark.parametrize("noise_steps", [0.0, 0.05, 0.2])
+def test_the_error_is_the_sum_of_its_sines_at_every_sample(noise_steps: float) -> None:
+    orders = np.arange(1, 7)
+    sizes = np.exp(-2.0 * (np.pi * orders * noise_steps) ** 2) / (np.pi * orders)
+    sizes = np.where(sizes < 1e-3, 0.0, sizes) * (-1.0) ** orders
+    shape = 0.2 * HARMONICS  # a quarter of a step less is nothing
+    exact = np.real(np.exp(1j * np.outer(THETA, np.arange(4))) @ shape)
+    squared = []
+    for change in (-0.25, 0.0, 0.25):
+        position = exact * max(0.0, 1.0 + change / np.abs(exact).max())
+        errors = [np.sin(2.0 * np.pi * np.outer(position + at, orders)) @ sizes for at in (0.0, 0.25)]
+        found = 2.0 / THETA.size * np.exp(-1j * np.outer(np.arange(1, 4), THETA)) @ np.transpose(errors)
+        along = found * np.conj(shape[1:] / np.abs(shape[1:]))[:, None]
+        squared.append([np.sum(along.real**2, axis=1), np.sum(along.imag**2, axis=1)])
+    in_phase, across = np.sqrt(np.max(squared, axis=0))
+    seen = rounding_errors(turns_of(THETA, 3), shape[None], np.ones(1), np.array([noise_steps]))[0, 1:]
+    np.testing.assert_allclose(seen, np.sqrt(0.5) * in_phase + 1j * across, rtol=1e-10, atol=1e-15)

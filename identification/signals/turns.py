@@ -1,0 +1,37 @@
+"""Harmonics of a phase, for sums over samples: coefficients of signals, and signals of coefficients."""
+
+import numpy as np
+
+from vibrolock.arrays import Float
+
+_BLOCK = 2048
+"""Samples that are computed at once. Chosen: their harmonics fit the cache of a core."""
+
+
+def turns_of(theta_rad: Float, highest: int, out: Float | None = None) -> Float:
+    """float[2, highest + 1, n]: cosines and minus sines of the harmonics from 0 up of a phase in float[n].
+
+    They are the factors of Re and Im of a coefficient Y_h in ``Re(Y_h exp(i h theta))``. Each comes from two lower ones:
+    ``cos(m + j) = 2 cos(m) cos(j) - cos(m - j)`` and ``sin(m + j) = 2 cos(m) sin(j) + sin(m - j)``.
+    """
+    turns = np.empty((2, highest + 1, theta_rad.size)) if out is None else out
+    turns[0, 0], turns[1, 0] = 1.0, 0.0
+    if highest:
+        np.cos(theta_rad, out=turns[0, 1])
+        np.negative(np.sin(theta_rad), out=turns[1, 1])
+    for start in range(0, theta_rad.size, _BLOCK):
+        _fill(turns[:, :, start : start + _BLOCK])
+    return turns
+
+
+def _fill(turns: Float) -> None:
+    """Compute the harmonics from the second up."""
+    middle = 1
+    while middle + 1 < turns.shape[1]:
+        more = turns[:, middle + 1 : 2 * middle + 1]
+        count = more.shape[1]
+        np.multiply(2.0 * turns[0, middle], turns[:, 1 : count + 1], out=more)
+        below = turns[:, middle - count : middle][:, ::-1]
+        more[0] -= below[0]
+        more[1] += below[1]
+        middle += count
