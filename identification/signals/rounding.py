@@ -64,7 +64,8 @@ def rounding_errors(
     rounded, terms = has_steps[terms[0] != 0.0], terms[:, terms[0] != 0.0]
     if rounded.size:
         steps = harmonics[rounded] / resolution[rounded, None]
-        position = np.tensordot([steps[:, 1:].real, steps[:, 1:].imag], turns[:, 1:], axes=([0, 2], [0, 1]))
+        factors = np.hstack([steps.real, steps.imag])
+        position = factors[:, 1:] @ turns.reshape(factors.shape[1], -1)[1:]  # without its mean
         found = _coefficients(turns[:, : wanted + 1], position, terms)
         out[rounded] = resolution[rounded, None] * _largest(found, steps[:, : wanted + 1])
     return out
@@ -98,7 +99,7 @@ def _coefficients(turns: Float, position: Float, terms: Float) -> Complex:
         sums += errors.reshape(sums.shape[0], -1) @ turns[:, :, block].reshape(sums.shape[1], -1).T
     found = (2.0 / position.shape[1]) * (sums[:, : turns.shape[1]] + 1j * sums[:, turns.shape[1] :])
     found[:, 0] *= 0.5
-    return np.moveaxis(found.reshape(2, *sizes.shape, -1), 2, 0).swapaxes(1, 2)
+    return np.asarray(np.moveaxis(found.reshape(2, *sizes.shape, -1), 2, 0).swapaxes(1, 2))
 
 
 def _cosine_and_sine(turns: Float) -> tuple[Float, Float]:
