@@ -12,6 +12,9 @@ from vibrolock.arrays import Float
 _UNEVEN = 1e-3
 """Largest relative difference of a step from the mean up to which instants that are not rounded are even: jitter of clocks."""
 _ULPS = 4.0  # errors of the last bit in an instant that was computed; chosen
+_FEW = 16
+"""Instants below which a rounding may be `_FINE` of a step: a few agree with some even grid by chance; chosen."""
+_FINE = 0.1
 _DIGITS = range(1, 16)  # digits of rates and steps that are tried, the roundest first
 _DECIMALS = range(-3, 13)  # decimals of print that are tried
 _SIGNIFICANT = range(3, 13)  # significant digits of print that are tried
@@ -109,7 +112,7 @@ def _grid(t: Float, half: Float, seconds: float, wanted_hz: float | None) -> tup
     origin, n = t[0], t.size - 1
     low, high, numbers = t - origin - half, t - origin + half, np.arange(t.size, dtype=np.float64)
     least, most = float(low[-1] - high[0]) / n, float(high[-1] - low[0]) / n
-    if 2.0 * float(half.max()) > (t[-1] - origin) / n:
+    if 2.0 * float(half.max()) > (t[-1] - origin) / n * (_FINE if t.size < _FEW else 1.0):
         return None  # as coarse as the steps: anything would agree
     steps, room = np.diff(t), half[1:] + half[:-1]
     if float(np.min(steps + room)) < least or float(np.max(steps - room)) > most:

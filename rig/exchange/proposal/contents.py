@@ -132,7 +132,7 @@ def _is_long(value: Value) -> bool:
 
 
 def _width(value: Value) -> tuple[int, ...]:
-    return np.shape(value)[1:]
+    return value.shape[1:] if isinstance(value, np.ndarray) else ()
 
 
 def _leaves(structure: Mapping[str, Value], above: str, depth: int) -> Iterator[tuple[str, Value]]:

@@ -1,11 +1,10 @@
-"""Volts of a sensor become its quantity by the sensitivity of its data sheet, in mappings and virtual sensors alike."""
+"""Volts of a sensor become its quantity by the sensitivity of its data sheet, in mappings as in virtual sensors."""
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from identification import TimeDataMapping, map_time_data
-from simulators.sensing.parts import Sensor
 
 VOLTS = np.array([0.01, -0.02, 0.03, 0.005])
 
@@ -25,13 +24,3 @@ def test_stored_volts_become_an_acceleration(unit, factor):
 def test_a_sensitivity_beside_another_unit_than_volts_is_refused():
     with pytest.raises(ValidationError, match="allowed: V or mV"):
         mapping("m/s2", "10 mV/g")
-
-
-def test_a_virtual_sensor_has_the_sensitivity_of_its_data_sheet():
-    about = {"name": "a", "kind": "acceleration", "at": "tip", "range_v": 5.0}
-    sensor = Sensor.model_validate({**about, "sensitivity": "10 mV/g"})
-    assert sensor.sensitivity_v_per_unit == pytest.approx(0.01 / 9.80665, rel=1e-12)
-    with pytest.raises(ValidationError, match="is per N; allowed: one per m/s"):
-        Sensor.model_validate({**about, "sensitivity": "22.4 mV/N"})
-    with pytest.raises(ValidationError, match="one of the two"):
-        Sensor.model_validate({**about, "sensitivity": "10 mV/g", "sensitivity_v_per_unit": 1.0})
