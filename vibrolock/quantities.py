@@ -14,6 +14,7 @@ Exponents = tuple[tuple[str, int], ...]
 """Base units and their exponents, sorted."""
 _LONGEST = 40  # letters of a unit that is read; chosen: whatever is longer is a remark
 _LARGEST_EXPONENT = 9
+_WITH_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,2})?)\s*(\D.*)")
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,15 @@ def quantity(text: str) -> Quantity | None:
         plain = plain.replace(old, new)
     plain = re.sub(r"\bper\b", "/", plain, flags=re.IGNORECASE)
     return _product(_WHOLE.get("".join(plain.split()), plain))
+
+
+def number_in(text: str, unit: str) -> float | None:
+    """Return the number of a text such as ``17 lbf`` in another unit; None if it is no number with a unit of that kind."""
+    found = _WITH_UNIT.fullmatch(text)
+    given, wanted = (quantity(found[2]), quantity(unit)) if found else (None, None)
+    if found is None or given is None or wanted is None or given.exponents != wanted.exponents:
+        return None
+    return float(found[1]) * float(given.factor / wanted.factor)
 
 
 def _product(text: str) -> Quantity | None:

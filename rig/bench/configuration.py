@@ -13,6 +13,8 @@ from rig.bench.vetting import refuse_absurd
 from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
 from vibrolock.described import Described
+from vibrolock.quantities import number_in
+from vibrolock.units import unit_of
 
 Table = dict[str, object]
 """A table of a TOML file, before a model has validated it."""
@@ -170,6 +172,9 @@ def _fault(detail: "ErrorDetails", keys: set[str]) -> ConfigurationError:
         bound, length = ("least", "min_length") if kind == "too_short" else ("most", "max_length")
         allowed = f"at {bound} {context[length]} of them"
     given = detail["input"]
+    if kind in ("float_type", "float_parsing") and (unit := unit_of(field)):
+        meant = number_in(given, unit) if isinstance(given, str) else None
+        allowed = f"a number in {unit}" + ("" if meant is None else f": {meant:.6g}")
     return ConfigurationError("is None" if given is None else "", field=field, value=given, allowed=allowed)
 
 

@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibrolock.quantities import quantity, says_a_unit, seconds_in
+from vibrolock.quantities import number_in, quantity, says_a_unit, seconds_in
 
 # SI unit and factor: standard gravity 9.80665 m/s2, inch 0.0254 m, pound of force 4.4482216152605 N (NIST SP 811).
 KNOWN = {
@@ -49,3 +49,21 @@ def test_units_of_time_may_tell_their_beginning_and_others_are_none():
     assert (seconds_in("Hz"), seconds_in("")) == (None, None)
     assert says_a_unit("counts")
     assert not any(map(says_a_unit, ("", " - ", "None", "n/a")))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "number"),
+    [
+        *(("17 lbf", "N", 17 * 4.4482216152605), ("0.2 N", "N", 0.2), ("-1.5e-3 kN", "N", -1.5), (".5in", "m", 0.0127)),
+        *(
+            ("5 g", "m/s^2", 49.03325),
+            ("2 m", "N", None),
+            ("17", "N", None),
+            ("1e400 furlongs", "m", None),
+            ("N", "N", None),
+        ),
+    ],
+)
+def test_a_number_with_a_unit_is_told_in_another(text, unit, number):
+    found = number_in(text, unit)
+    assert found is None if number is None else found == pytest.approx(number, rel=1e-12)

@@ -122,7 +122,7 @@ def test_a_rig_of_wrong_types_or_that_cannot_be_computed_is_refused(tmp_path, ch
 def test_a_line_names_a_few_of_many_faults_and_says_how_many_there_are():
     table = {"kind": "backbone", "bench": "b", "levels_v": ["x"] * 9_000, "controller": {}}
     line = refusal(plan_from, table, "plan.toml")
-    assert line.startswith("plan.toml: levels_v[0] = 'x'; allowed: a valid number; levels_v[1]")
+    assert line.startswith("plan.toml: levels_v[0] = 'x'; allowed: a number in V; levels_v[1]")
     assert line.endswith("; and 8997 more")
 
 
