@@ -11,6 +11,9 @@ from vibrolock.arrays import Float
 from vibrolock.quantities import SIGNALS, quantity
 
 _IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]$")
+_ANYWHERE = re.compile(r"[\[({<]([^\[\](){}<>]*[^\[\](){}<>\d][^\[\](){}<>]*)[\])}>]")
+_BEHIND = re.compile(r".*\S(?:\s+/\s*|,\s*|:\s+|\s+in\s+)(\S[^,]*)$")  # Force / kN; Force, kN; Force in kN
+_LAST_WORD = re.compile(r".*[^\W_](?:[_ /:]|\s)(ms|us|µs|μs|ns|msec|usec|kN|mN|lbf|mV|mm|um|µm|μm)$")  # force_kN
 _IN_NAMES = (*SIGNALS, "s")
 
 Value = (
@@ -115,11 +118,24 @@ def from_variables(values: dict[str, Value], units: Mapping[str, Value] | None =
     )
 
 
+def units_beside(values: Mapping[str, Value]) -> dict[str, Value]:
+    """Return the units of values by name: texts called ``NAME_unit`` or ``NAME_units`` beside them."""
+    keys = {name: next((key for key in (f"{name}_unit", f"{name}_units") if key in values), "") for name in values}
+    return {name: values[key] for name, key in keys.items() if key and isinstance(values[key], str)}
+
+
 def unit_in_name(name: str) -> str:
-    """Return a unit of a signal or of time in brackets at the end of a name, ``Force [N]``; empty without one."""
-    found = _IN_BRACKETS.search(name)
-    known = quantity(found[1]) if found is not None else None
-    return found[1].strip() if found is not None and known is not None and known.si in _IN_NAMES else ""
+    """Return a unit of a signal or of time in a name; empty without one.
+
+    It is in brackets, ``Force [N]``, behind a sign or a word, ``Force / kN``, ``Force, kN``, ``Force in kN``, or one of several
+    letters that nothing else means, ``force_kN``, ``time_ms``.
+    """
+    last = [found for pattern in (_IN_BRACKETS, _BEHIND, _LAST_WORD) if (found := pattern.search(name)) is not None]
+    for text in (*(found[1] for found in last), *_ANYWHERE.findall(name)):
+        known = quantity(text)
+        if known is not None and known.si in _IN_NAMES:
+            return str(text).strip()
+    return ""
 
 
 def without_unit(name: str) -> str:

@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.exchange.file_data import ChannelFacts, FileData, StoredObject, Value, from_variables
+from rig.exchange.file_data import ChannelFacts, FileData, StoredObject, Value, from_variables, units_beside
 from rig.text.contents import Contents
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
 _MAX_DEPTH = 8  # levels of structures in which signals are looked for; chosen
+_DATA, _NAMES_OF, _UNITS_OF = ("data", "values", "samples"), ("name", "label"), ("unit", "units")
+"""Fields of a structure of one signal, in small letters."""
 _MAX_NAME = 31  # most characters of a field name that every reader of version 5 accepts
 
 
@@ -86,21 +88,33 @@ def parsed_mat(path: Path) -> FileData:
 
 
 def signals_described(value: Value, path: str = "", depth: int = 0) -> Iterator[tuple[str, ChannelFacts]]:
-    """Yield what structures with ``Data``, ``Name`` and ``Unit`` say of their data, by its path.
+    """Yield what structures say of the signals in them, by path.
 
-    dSPACE ControlDesk writes them: a structure ``X`` of the instants and structures ``Y`` of the signals.
+    That are ``Data`` (or ``values``, ``samples``) with ``Name`` and ``Unit``, as dSPACE ControlDesk writes them: a structure
+    ``X`` of the instants and structures ``Y`` of the signals; and ``force`` with ``force_unit``, or ``units.force``.
     """
     if depth > _MAX_DEPTH:
         return
     if isinstance(value, dict):
-        name, unit = (text if isinstance(text := value.get(key), str) else "" for key in ("Name", "Unit"))
-        if isinstance(value.get("Data"), np.ndarray) and (name or unit):
-            yield f"{path}.Data", ChannelFacts(name=name, unit=unit)
+        name, unit = _text_at(value, _NAMES_OF), _text_at(value, _UNITS_OF)
+        data = next((key for key in value if key.lower() in _DATA and isinstance(value[key], np.ndarray)), "")
+        if data and path and (name or unit):
+            yield f"{path}.{data}", ChannelFacts(name=name, unit=unit)
+        units = value.get("units")
+        beside = {**(units if isinstance(units, dict) else {}), **units_beside(value)}
+        above = f"{path}." if path else ""
+        yield from ((f"{above}{key}", ChannelFacts(unit=text)) for key, text in beside.items() if isinstance(text, str))
         for key, item in value.items():
             yield from signals_described(item, f"{path}.{key}" if path else key, depth + 1)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1):
         for index, item in enumerate(value):
             yield from signals_described(item, f"{path}[{index}]", depth + 1)
+
+
+def _text_at(structure: Mapping[str, Value], keys: tuple[str, ...]) -> str:
+    """Return the first text in a structure at one of the keys, in small letters; empty without one."""
+    found = (value for key, value in structure.items() if key.lower() in keys and isinstance(value, str))
+    return next(found, "")
 
 
 def stored_objects(data: FileData) -> list[StoredObject]:

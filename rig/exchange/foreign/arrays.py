@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.exchange.child_values import TooMuchData, most_bytes
-from rig.exchange.file_data import FileData, Value, from_variables
+from rig.exchange.file_data import FileData, Value, from_variables, units_beside
 from rig.exchange.tables.heading import is_units
 from vibrolock.arrays import Float
 
@@ -30,7 +30,7 @@ def read_npz(path: Path) -> FileData:
             if entry.filename.endswith(".npy"):
                 stored = io.BytesIO(archive.read(entry))
                 values[entry.filename.removesuffix(".npy")] = _plain(np.load(stored, allow_pickle=False))
-    return from_variables(values, _units(values))
+    return from_variables(values, units_beside(values))
 
 
 def _plain(array: NDArray[Any]) -> Value:
@@ -42,11 +42,6 @@ def _plain(array: NDArray[Any]) -> Value:
     if array.dtype.kind not in "biufc":
         return f"<{array.dtype}>"
     return array[()] if array.ndim == 0 else array
-
-
-def _units(values: dict[str, Value]) -> dict[str, Value]:
-    """Return the units of arrays: texts called ``NAME_unit`` or ``NAME_units``."""
-    return {name: values[key] for name in values for key in (f"{name}_unit", f"{name}_units") if key in values}
 
 
 def read_workbook(path: Path) -> FileData:

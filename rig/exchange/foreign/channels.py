@@ -29,6 +29,9 @@ _SCALES = (
     *("Polynomial", "Linear", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI"),
 )
 """Kinds of scales that npTDMS applies (version 1.13)."""
+_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
+"""Properties of TDMS that say the unit, the first that is there."""
+_TIME = (0, 1)  # types of a master channel that is time: none said, or time (ASAM MDF 4.1, block CN)
 _FROM_1904_S = 2_082_844_800  # from the origin of time stamps of TDMS, 1904, to 1970
 _FORMULA = 3  # type of a conversion by a formula (ASAM MDF 4.1, block CC)
 Found = dict[str, tuple[NDArray[np.generic], ChannelFacts]]
@@ -83,7 +86,7 @@ def _facts_of_tdms(name: str, every: Sequence[Mapping[str, object]]) -> ChannelF
     """Return what the properties of a channel say, and those of its group and file of its scales."""
     properties = every[0]
     step, start = properties.get("wf_increment"), properties.get("wf_start_offset")
-    unit = properties.get("unit_string") or properties.get("NI_UnitDescription")
+    unit = next((properties[key] for key in _UNITS if properties.get(key)), "")
     of_time = properties.get("wf_xunit_string")
     seconds = seconds_in(of_time) if isinstance(of_time, str) and says_a_unit(of_time) else 1.0
     known = isinstance(step, float) and step > 0.0 and seconds is not None
@@ -151,6 +154,8 @@ def read_mdf4(path: Path) -> FileData:
 def _facts_of_mdf(name: str, signal: "Signal") -> ChannelFacts:
     even = even_sampling(signal.timestamps)
     remarks = [] if even is not None else ["is not evenly sampled; resample it"]
+    if signal.master_metadata is not None and signal.master_metadata[1] not in _TIME:
+        remarks = [f"is sampled over '{signal.master_metadata[0]}', which is no time"]
     if signal.invalidation_bits is not None and (invalid := int(np.count_nonzero(signal.invalidation_bits))):
         remarks.append(f"has {invalid} samples that are marked as invalid")
     return ChannelFacts(

@@ -131,12 +131,20 @@ def _plain(value: NDArray[np.void], dtype: Type) -> Value:
 
 
 def _attributes(item: "h5py.Group | h5py.Dataset", name: str) -> Iterator[tuple[str, Value]]:
-    """Yield the attributes that are numbers or texts."""
+    """Yield the attributes that are numbers or texts; an array of one text is that text, of several a list."""
     for key in item.attrs:
         try:
             value = item.attrs[key]
         except (OSError, TypeError, ValueError):
             continue  # of a type that h5py does not know
         value = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-        if isinstance(value, str) or (isinstance(value, np.generic | np.ndarray) and value.dtype.kind in _PLAIN):
+        if isinstance(value, np.ndarray) and value.dtype.kind in "OS":
+            texts: list[Value] = [
+                one.decode("utf-8", "replace") if isinstance(one, bytes) else one
+                for one in value.reshape(-1)
+                if isinstance(one, str | bytes)
+            ]
+            if texts and len(texts) == value.size:
+                yield f"{name}@{key}", texts[0] if len(texts) == 1 else texts
+        elif isinstance(value, str) or (isinstance(value, np.generic | np.ndarray) and value.dtype.kind in _PLAIN):
             yield f"{name}@{key}", value

@@ -128,6 +128,7 @@ def _columns(segment: _Segment, head: dict[str, str], day: datetime) -> list[_Co
     """Return the channels of a segment, and its instants where they are no even steps."""
     found: list[_Column] = []
     instants: tuple[str, Float] | None = None
+    agreed = False  # whether instants that are those of the first channel alone agree with its head
     for at, (name, numbers) in enumerate(zip(segment.names, segment.columns, strict=True)):
         values = np.array(numbers, np.float64)
         if name == _X:
@@ -137,11 +138,12 @@ def _columns(segment: _Segment, head: dict[str, str], day: datetime) -> list[_Co
             continue
         step, start = _number(segment, "Delta_X", at, head), _number(segment, "X0", at, head)
         timed = _text(segment, "X_Dimension", at) in ("", "Time")
-        if instants is not None and not _even(instants[1][: values.size], step, start):
+        if instants is not None and not agreed and not _even(instants[1][: values.size], step, start):
             found += (
                 [] if any(one.values is instants[1] for one in found) else [_Column(*instants, "s" * timed, None, 0.0)]
             )
             step = None
+        agreed = agreed or (instants is not None and step is not None and head.get("X_Columns") == "One")
         unit = _text(segment, "Y_Unit_Label", at)
         began = _instant(_text(segment, "Date", at), _text(segment, "Time", at), day)
         found.append(_Column(name, values, unit, step if timed else None, began + (start or 0.0)))

@@ -70,7 +70,8 @@ class _Reader:
         if h5py.check_ref_dtype(item.dtype) is h5py.Reference:
             return self._cells(np.squeeze(stored.T), depth)
         if kind == "char":
-            rows = np.atleast_2d(np.asarray(stored).T)
+            rows = np.moveaxis(np.atleast_2d(np.asarray(stored).T), 1, -1)
+            rows = rows.reshape(-1, rows.shape[-1])
             texts: list[Value] = ["".join(map(chr, row.astype(np.uint32))) for row in rows]
             return texts[0] if len(texts) == 1 else texts
         if stored.dtype.names is not None and set(stored.dtype.names) == {"real", "imag"}:

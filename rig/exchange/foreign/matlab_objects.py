@@ -45,8 +45,9 @@ def read_objects(
 ) -> tuple[dict[str, Value], dict[str, ChannelFacts]]:
     """Return the variables that are objects, and what tables say of theirs.
 
-    ``kinds`` are their classes by name, ``others`` the variables that are none. Without mat-io, and for objects that it does
-    not read, raises ValueError with the MATLAB command that saves them readably.
+    ``kinds`` are their classes by name, ``others`` the variables that are none. Objects that mat-io does not read are left out;
+    what the file says of them is the MATLAB command that saves them readably. Raises ValueError with it without mat-io, and
+    if nothing else is in the file.
     """
     try:
         from matio import load_from_mat
@@ -61,8 +62,14 @@ def read_objects(
         if name in others or name.startswith("__"):
             continue
         kind = kinds.get(name, "object")
-        values[name] = plain(value, f"'{name}' is a MATLAB {kind}, which is not read; {advice(name, kind)}")
-        facts |= dict(_units(name, value))
+        try:
+            values[name] = plain(value, f"is a MATLAB {kind}, which is not read; {advice(name, kind)}")
+            facts |= dict(_units(name, value))
+        except ValueError as error:
+            facts[name] = ChannelFacts(unread=str(error))
+    first = next((name for name in facts if facts[name].unread), "")
+    if first and not values and not others:
+        raise ValueError(f"'{first}' {facts[first].unread}")
     return values, facts
 
 
@@ -87,6 +94,8 @@ def plain(value: Any, otherwise: str) -> Value:
         ]
         return entries[0] if len(entries) == 1 else entries
     if value.dtype.kind == "m":
+        if np.datetime_data(value.dtype)[0] in "YM":
+            raise ValueError(otherwise)  # calendar durations, which are no number of seconds
         return np.squeeze(value / np.timedelta64(1, "ns")) * 1e-9
     if value.dtype.kind == "M":
         return (

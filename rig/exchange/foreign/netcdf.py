@@ -29,7 +29,7 @@ def read_classic(path: Path) -> dict[str, Value]:
     with netcdf_file(str(path), "r", mmap=False, maskandscale=False) as file:
         found: dict[str, Value] = dict(_attributes("", file._attributes))
         for name, variable in file.variables.items():
-            values: NDArray[Any] = np.asarray(variable[:])
+            values: NDArray[Any] = np.asarray(variable.data)
             most -= values.nbytes
             if most < 0:
                 raise TooMuchData(most_bytes(path))

@@ -61,9 +61,14 @@ def is_time(name: str, values: NDArray[np.generic], unit: str = "") -> bool:
     steps = np.diff(values.astype(np.float64))
     if not np.all(steps >= 0.0) or not np.any(steps > 0.0):
         return False
-    if seconds_in(unit) is not None or _TIMES.match(name):
+    if is_named_time(name, unit):
         return True
     return values.size >= _RAMP and not np.all(steps == 1.0) and even_sampling(values) is not None
+
+
+def is_named_time(name: str, unit: str = "") -> bool:
+    """Return whether a name or a unit tells that an array holds instants."""
+    return seconds_in(unit) is not None or _TIMES.match(name) is not None
 
 
 def role_of(name: str, unit: str) -> tuple[str, str]:

@@ -11,13 +11,23 @@ from identification.mapping import CsvLayout, even_sampling
 from rig.exchange.child_reading import ImportFailed, read_in_child
 from rig.exchange.file_data import MappingText
 from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
-from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_of, rate_in, role_of, transient_periods
+from rig.exchange.proposal.guesses import (
+    band_of,
+    dimensions,
+    is_named_time,
+    is_time,
+    period_of,
+    rate_in,
+    role_of,
+    transient_periods,
+)
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
 from rig.exchange.tables.guess import guessed_layout
 from vibrolock.quantities import seconds_in
 
 _MIN_SAMPLES = 16  # samples of the shortest signal; chosen
+_ONE_RATE = 1e-4  # relative difference of rates of instants as they are printed; chosen
 _MAX_CHANNELS = 16  # channels that are proposed; chosen
 
 
@@ -147,6 +157,7 @@ def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float |
     """Return the sample rate, where it is from (empty: the file tells it), and the instants, if these tell it."""
     if found[0].rate_hz is not None:
         return found[0].rate_hz, "", None
+    _check_clocks(times)
     for leaf in times:
         if (even := even_sampling(leaf.values, seconds_in(leaf.unit) or 1.0)) is not None:
             return even.rate_hz, "", leaf
@@ -155,6 +166,20 @@ def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float |
         if (named := rate_in({**contents.single, **beside})) is not None:
             return named[1], named[0], None
     return None, "", None
+
+
+def _check_clocks(times: Sequence[Leaf]) -> None:
+    """Raise `ImportFailed` if a file holds instants of several rates: a mapping takes one."""
+    named = [leaf for leaf in times if is_named_time(leaf.name, leaf.unit) and not leaf.file]
+    told = {leaf.path: even_sampling(leaf.values, seconds_in(leaf.unit) or 1.0) for leaf in named}
+    rates = {path: even.rate_hz for path, even in told.items() if even is not None}
+    first = next(iter(rates.items()), None)
+    for path, rate in rates.items():
+        if first is not None and abs(rate / first[1] - 1.0) > _ONE_RATE:
+            raise ImportFailed(
+                f"the instants '{first[0]}' have {first[1]:.6g} Hz, '{path}' have {rate:.6g} Hz, and a mapping takes those of "
+                "one rate; save the channels of each as a file"
+            )
 
 
 def _periods(

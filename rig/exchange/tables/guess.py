@@ -9,10 +9,12 @@ from typing import Literal, get_args
 
 from identification.mapping import CsvLayout, Encoding
 from rig.exchange.child_reading import ImportFailed
+from rig.exchange.tables.heading import are_units_above
 from rig.exchange.tables.rows import cells_of
 from rig.exchange.tables.text import blocks, encoding_of, table_lines
 from vibrolock.quantities import quantity
 
+_LABEL = re.compile(r"units?\s*[:=]\s*", re.IGNORECASE)  # ahead of units in a comment
 _EXAMINED_LINES = 100  # lines that are examined at the beginning and at the end; chosen
 _EQUAL_ROWS = 3  # rows of equally many numbers that make a table; chosen
 _TRIED: tuple[tuple[Literal[",", ";", "\t", " "], Literal[".", ","]], ...] = (
@@ -31,12 +33,14 @@ def guessed_layout(path: Path) -> CsvLayout | None:
     None as well if no table is found. Raises `ImportFailed` for what is no text.
     """
     encoding = encoding_of(path)
-    lines = [line for _, line in islice(table_lines(blocks(path, encoding)), _EXAMINED_LINES)]
+    numbered = [*islice(table_lines(blocks(path, encoding)), _EXAMINED_LINES)]
+    lines = [line for _, line in numbered]
     for texts in (False, True):  # whether columns may hold texts
         for separator, decimal in _TRIED:
             first = _first_row(lines, separator, decimal, texts)
             if first is not None:
-                return _layout(path, encoding, lines, first, separator, decimal)
+                above = _comments(path, encoding, numbered[first][0])
+                return _layout(path, encoding, lines, first, separator, decimal, above)
     return None
 
 
@@ -47,24 +51,60 @@ def _layout(
     first: int,
     separator: Literal[",", ";", "\t", " "],
     decimal: Literal[".", ","],
+    comments: Sequence[str],
 ) -> CsvLayout | None:
     width = len(_cells(lines[first], separator))
     heading = next((at for at in (first - 1, first - 2) if at >= 0 and _names(lines[at], separator, width)), None)
     if heading is not None and heading > 0 and _has_unit(lines[heading], separator):
         heading -= 1 if _names(lines[heading - 1], separator, width) else 0
+    if heading and are_units_above(_cells(lines[heading - 1], separator), _cells(lines[heading], separator)):
+        heading -= 1
+    names = _told_names(
+        [] if heading is None else _cells(lines[heading], separator), lines[:first], comments, separator, width
+    )
     last = _lines_after(path, encoding, separator, decimal, _shape(lines[first], separator, decimal))
     told = encoding.removesuffix("-sig")
     plain = separator in (",", ";", "\t") and decimal == "." and not last and told == "utf-8"
-    if plain and heading == 0:
+    if plain and heading == 0 and not names:
         return None
+    if names:
+        heading = None
+    elif heading is None:
+        names = tuple(f"column{number}" for number in range(1, width + 1))
     return CsvLayout(
         skip_lines=first if heading is None else heading,
         skip_last_lines=last,
-        names=None if heading is not None else tuple(f"column{number}" for number in range(1, width + 1)),
+        names=names or None,
         separator=separator,
         decimal=decimal,
         encoding=None if told == "utf-8" else next(one for one in get_args(Encoding) if one == told),
     )
+
+
+def _comments(path: Path, encoding: str, row: int) -> list[str]:
+    """Return the comments above a row, the last one first."""
+    lines = next(blocks(path, encoding))[1].split("\n")[: row - 1]
+    return [line.lstrip("# ").strip() for line in reversed(lines) if line.startswith("#")]
+
+
+def _told_names(
+    names: Sequence[str], above: Sequence[str], comments: Sequence[str], separator: str, width: int
+) -> tuple[str, ...]:
+    """Return the names of the columns, with units in brackets, where a comment tells names or units; else nothing.
+
+    So do names that two spaces and more separate, above numbers that spaces separate.
+    """
+    if not names:
+        wide = (
+            [re.split(r"\s{2,}|\t", line.strip()) for line in (*above[-1:], *comments[:1])] if separator == " " else []
+        )
+        rows = [*wide, *(_cells(line, separator) for line in comments)]
+        return next((tuple(cells) for cells in rows if _are_names(cells, width)), ())
+    for line in comments:
+        cells = [cell.strip("[]() ") for cell in _cells(_LABEL.sub("", line), separator)]
+        if len(cells) == width and all(not cell or quantity(cell) is not None for cell in cells):
+            return tuple(f"{name} [{cell}]" if cell else name for name, cell in zip(names, cells, strict=True))
+    return ()
 
 
 def _cells(line: str, separator: str) -> list[str]:
@@ -110,6 +150,9 @@ def _has_unit(line: str, separator: str) -> bool:
 
 def _names(line: str, separator: str, width: int) -> bool:
     """Return whether a line may name the columns: as many different texts, none of them a number."""
-    cells = _cells(line, separator)
+    return _are_names(_cells(line, separator), width)
+
+
+def _are_names(cells: Sequence[str], width: int) -> bool:
     texts = all(cell and not _NUMBER["."].match(cell) for cell in cells)
     return len(cells) == width and len(set(cells)) == width and texts

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from identification.mapping import CsvLayout
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.tables.rows import Columns, cells_of
+from vibrolock.quantities import quantity
 
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 Lines = Sequence[tuple[int, str]]
@@ -35,6 +36,12 @@ def heading_of(lines: Lines, layout: CsvLayout) -> Heading | None:
     if not lines:
         return None
     separator = layout.separator or _separator(lines[0][1], layout.decimal)
+    if (
+        layout.names is None
+        and len(lines) > 1
+        and are_units_above(*(cells_of(line, separator) for _, line in lines[:2]))
+    ):
+        lines = [lines[1], lines[0], *lines[2:]]
     names = _names(lines[0][1], separator) if layout.names is None else layout.names
     plain = Columns(tuple(names), separator, layout.decimal)
     above = [] if layout.names is not None else [lines[0][1]]
@@ -80,6 +87,17 @@ def is_units(cells: Sequence[str], decimal: str = ".") -> bool:
     return None in values and all(
         cell == "1" if value is not None else not _DIGIT_FIRST.match(cell)
         for cell, value in zip(cells, values, strict=True)
+    )
+
+
+def are_units_above(first: Sequence[str], second: Sequence[str]) -> bool:
+    """Return whether a row holds known units and nothing else, and the next one the names that belong to them."""
+    return (
+        len(first) == len(second)
+        and any(cell.strip() for cell in first)
+        and all(not cell.strip() or quantity(_unit(cell.strip())) is not None for cell in first)
+        and all(cell.strip() and not _DIGIT_FIRST.match(cell) for cell in second)
+        and any(quantity(cell) is None for cell in second)
     )
 
 

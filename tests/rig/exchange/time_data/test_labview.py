@@ -75,6 +75,13 @@ def test_segments_with_gaps_are_records(tmp_path):
     np.testing.assert_array_equal(found.values["Force"], np.column_stack([VALUES[:, 0], 2.0 * VALUES[:, 0]]))
 
 
+def test_instants_of_the_first_channel_alone_are_not_those_of_another_with_its_own_step(tmp_path):
+    steps = f"Delta_X\t{STEP!r}\t{STEP!r}"
+    assert steps in segment(VALUES)
+    found = read(tmp_path, head() + segment(VALUES).replace(steps, f"Delta_X\t{STEP!r}\t{2.0 * STEP!r}"))
+    assert [one.sample_rate_hz for one in found.channels.values()] == pytest.approx([51200.0, 25600.0], rel=1e-12)
+
+
 def test_instants_that_are_no_even_steps_are_kept_and_give_no_rate(tmp_path):
     found = read(tmp_path, head() + segment(VALUES, instants=0.3 * np.arange(N) ** 1.1))
     assert found.channels["Force"].sample_rate_hz is None
