@@ -116,6 +116,10 @@ def hdf5_by_dots(path: Path, of: Case) -> Case:
     return {**hdf5_scaled(path, of), "paths": ("x.F", "x.a")}
 
 
+def hdf5_gain(path: Path, of: Case) -> Case:
+    return _hdf5(path, of, VALUES[0], gain=1000.0)
+
+
 def hdf5_missing(path: Path, of: Case) -> Case:
     return _hdf5(path, of, np.where(np.arange(N) == 5, -999.0, VALUES[0]), _FillValue=-999.0)
 
@@ -407,6 +411,7 @@ USED: dict[tuple[str, str], tuple[Writer, ...]] = {
     ("LabVIEW", "units"): (lvm_units,), ("LabVIEW", "start time"): (lvm_starts,),
 }  # fmt: skip
 REFUSED: dict[tuple[str, str], tuple[tuple[Writer, str], ...]] = {
+    ("HDF5", "scale, offset"): ((hdf5_gain, "has the attribute gain (1000)"),),
     ("HDF5", "missing, invalid"): (
         (hdf5_missing, "has 1 missing values (_FillValue -999.0)"),
         (hdf5_valid_range, "outside its valid range, -0.1 to 0.1"),
