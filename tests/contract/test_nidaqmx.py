@@ -23,6 +23,7 @@ class TestOverADeviceServer(DriverContract):
 
     blocks = (16, 64)
     long_run_blocks = 200
+    late_s = prompt_s = 10.0  # the server is in this process, on a machine that the tests keep busy
 
     @pytest.fixture(autouse=True)
     def _chassis(self, chassis: Served) -> Iterator[None]:
