@@ -6,6 +6,8 @@ other names that seem to be factors are facts that cannot be followed: files do 
 """
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from vibrolock.quantities import says_a_unit
 _UNITS = ("units", "unit", "unitname", "unitstring", "unitstr", "engineeringunits", "engineeringunit", "eu")
 _RATES = ("samplerate", "sampleratehz", "samplingrate", "samplingfrequency", "fs")
 _STEPS = ("dt", "wfincrement", "samplinginterval", "sampleinterval")
+_STARTS = ("starttime", "t0", "startoffset", "wfstartoffset", "wfstarttime", "starttimestamp")
 _FACTORS = (
     *("gain", "scale", "scaling", "scalingfactor", "conversion", "conversionfactor", "multiplier", "factor", "slope"),
     *("calibration", "calibrationfactor", "sensitivity", "polarity"),
@@ -34,15 +37,17 @@ _NOT_WRITTEN = {
 def facts_of_attributes(values: Mapping[str, Value], *, netcdf: bool = False) -> dict[str, ChannelFacts]:
     """Return what ``name@attribute`` beside each array of numbers says of it, by name.
 
-    Scale and offset count as CF has them: stored numbers times ``scale_factor`` plus ``add_offset``. Values that are marked as
-    missing or lie outside the valid range, and unsigned numbers in a signed type, are facts that cannot be followed; in a file
-    of NetCDF also those that were never written.
+    Starts count from the earliest. Scale and offset count as CF has them: stored numbers times ``scale_factor`` plus
+    ``add_offset``. Values that are marked as missing or lie outside the valid range, and unsigned numbers in a signed type,
+    are facts that cannot be followed; in a file of NetCDF also those that were never written.
     """
     every: dict[str, dict[str, Value]] = {}
     for key, value in values.items():
         name, at, attribute = key.rpartition("@")
         if at:
             every.setdefault(name, {})[attribute] = value
+    starts = {name: start for name, of in every.items() if (start := _start_s(of)) is not None}
+    earliest = min(starts.values(), default=0.0)
     found: dict[str, ChannelFacts] = {}
     for name, of in every.items():
         value, units = values.get(name), _units(of)
@@ -58,6 +63,7 @@ def facts_of_attributes(values: Mapping[str, Value], *, netcdf: bool = False) ->
                 scale=_number(of.get("scale_factor")),
                 offset=_number(of.get("add_offset")),
                 sample_rate_hz=_rate_hz(of),
+                start_s=starts[name] - earliest if name in starts else None,
                 unread="; ".join([*several, *_unread(value, of), *(_unwritten(value, of) if netcdf else [])]),
             )
             found |= {} if facts == ChannelFacts() else {name: facts}
@@ -85,6 +91,21 @@ def _rate_hz(of: Mapping[str, Value]) -> float | None:
             number = _number(value) if _plain(key) in names else None
             if number is not None and 0.0 < number < np.inf:
                 return float(number**power)
+    return None
+
+
+def _start_s(of: Mapping[str, Value]) -> float | None:
+    """Return the instant of the first sample: s, or a date and time of ISO 8601, of UTC where it has no zone."""
+    for key, value in of.items():
+        if _plain(key) not in _STARTS:
+            continue
+        number = _number(value)
+        if number is None and isinstance(value, str):
+            with suppress(ValueError):
+                instant = datetime.fromisoformat(value)
+                number = (instant if instant.tzinfo else instant.replace(tzinfo=UTC)).timestamp()
+        if number is not None and np.isfinite(number):
+            return number
     return None
 
 

@@ -120,6 +120,25 @@ def hdf5_gain(path: Path, of: Case) -> Case:
     return _hdf5(path, of, VALUES[0], gain=1000.0)
 
 
+def _hdf5_begun(path: Path, of: Case, late_s: float) -> Case:
+    """Without instants; the force begins at noon."""
+    with h5py.File(path, "w") as file:
+        for name, values, unit, begin in (("F", VALUES[0], of["force"], 0.0), ("a", VALUES[1], of["motion"], late_s)):
+            file[f"x/{name}"] = values
+            about = {"units": unit, "sample_rate": of["rate"], "start_time": f"2026-03-01T12:00:{begin:09.6f}+00:00"}
+            file[f"x/{name}"].attrs.update(about)
+    return {**of, "paths": ("x/F", "x/a")}
+
+
+def hdf5_starts(path: Path, of: Case) -> Case:
+    of = {**of, "rate": 5000.0}
+    return _hdf5_begun(path, of, of["late"] / 5000.0)
+
+
+def hdf5_starts_between_samples(path: Path, of: Case) -> Case:
+    return _hdf5_begun(path, of, 0.1)
+
+
 def hdf5_missing(path: Path, of: Case) -> Case:
     return _hdf5(path, of, np.where(np.arange(N) == 5, -999.0, VALUES[0]), _FillValue=-999.0)
 
@@ -401,7 +420,7 @@ USED: dict[tuple[str, str], tuple[Writer, ...]] = {
     ("TDMS", "start time"): (tdms_starts,),
     ("HDF5", "rounded instants"): (hdf5_single,), ("MDF 4", "rounded instants"): (mdf_rounded,),
     ("SEP005", "rounded instants"): (sep005_rounded,),
-    ("MAT", "start time"): (mat_units,), ("CSV", "start time"): (csv_units,), ("HDF5", "start time"): (hdf5_units,),
+    ("MAT", "start time"): (mat_units,), ("CSV", "start time"): (csv_units,), ("HDF5", "start time"): (hdf5_units, hdf5_starts),
     ("MDF 4", "units"): (mdf_units,), ("MDF 4", "scale, offset"): (mdf_scaled,), ("MDF 4", "start time"): (mdf_starts,),
     ("SEP005", "units"): (sep005_units,), ("SEP005", "start time"): (sep005_starts,),
     ("NumPy", "units"): (npz_units,), ("NumPy", "unit of time"): (npz_units,), ("NumPy", "start time"): (npz_units,),
@@ -423,6 +442,7 @@ REFUSED: dict[tuple[str, str], tuple[tuple[Writer, str], ...]] = {
     ("MDF 4", "start time"): ((mdf_starts_between_samples, "samples before another"),),
     ("SEP005", "start time"): ((sep005_starts_between_samples, "begins 204.80 samples before another"),),
     ("SEP005", "uneven instants"): ((sep005_uneven, "allowed are evenly spaced instants"),),
+    ("HDF5", "start time"): ((hdf5_starts_between_samples, "samples before another"),),
     ("HDF5", "uneven instants"): ((hdf5_uneven, "is not evenly spaced"),),
     ("CSV", "uneven instants"): ((csv_uneven, "is not evenly spaced"),),
     ("MAT", "uneven instants"): ((mat_uneven, "is not evenly spaced"),),
