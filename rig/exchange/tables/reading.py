@@ -35,7 +35,9 @@ def read_table(path: Path, layout: CsvLayout | None = None) -> FileData:
             raise ImportFailed("holds no table; wanted is a line of names, then rows of numbers")
         numbers = _columns(heading.columns, rest, layout.skip_last_lines)
     except ImportFailed as error:
-        raise error if str(error).startswith(str(path)) else ImportFailed(f"{path}, {error}") from None
+        if str(error).startswith(str(path)):
+            raise
+        raise ImportFailed(f"{path}{', ' if str(error).startswith('line ') else ': '}{error}") from None
     columns = heading.columns
     values: dict[str, Value] = {columns.names[at]: f"<texts such as {heading.first[at]!r}>" for at in columns.texts}
     values |= {columns.names[at]: column for at, column in zip(columns.numeric, numbers, strict=True)}

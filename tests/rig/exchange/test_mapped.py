@@ -280,7 +280,7 @@ def test_a_table_of_a_nonlinear_mode_becomes_one(tmp_path):
     [
         ("", {"says": "holds-no-table"}),
         ("f,H\n", {"says": "holds-no-table"}),
-        ("f,H\nHz,1\n", {"says": "holds-names-but-no-row-of"}),
+        ("f,H\nHz,1\n", {"says": "holds-no-table"}),
         ("1,2\n3,4\n", {"says": "the-first-line-must-name-every"}),
         ("f,f\n3,4\n", {"says": "the-first-line-must-name-every-2"}),
         ("f;H\n3,5;4\n", {"says": "line-is-no-number-write-decimals"}),
