@@ -79,4 +79,4 @@ class Watchdogs:
                         task.failure = expired
                         if task.generation is not None:
                             task.generation.has_failed = True
-                self._timeline.put_out(float(watchdog.attributes["AO_EXPIR_STATE"]))  # type: ignore[arg-type]
+                self._timeline.put_out(watchdog.number("AO_EXPIR_STATE"))
