@@ -87,8 +87,10 @@ def hum(values: Float, mains_hz: float, sample_rate_hz: float) -> float:
     columns = [part(2.0 * math.pi * f * time) for f in frequencies for part in (np.cos, np.sin)]
     if not columns:
         return 0.0
-    matrix = np.column_stack([np.ones_like(time), time, *columns])
-    found, *_ = np.linalg.lstsq(matrix, values, rcond=None)
+    matrix = np.column_stack([np.ones_like(time), time / time[-1] - 0.5, *columns])
+    found, *_ = np.linalg.lstsq(
+        matrix.T @ matrix, matrix.T @ values
+    )  # columns nearly orthogonal: as good as over all rows
     left = float(np.std(values - matrix @ found))
     amplitudes = np.hypot(found[2::2], found[3::2])
     loud = amplitudes > MIN_SIGNIFICANCE * left * math.sqrt(2.0 / values.size)

@@ -1,14 +1,17 @@
 """The part of the loop common to all processes: exchange blocks, and bring the output to 0 V whatever the driver raises."""
 
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
 
 from rig.daq import CONTINUED, DAQ, HELD, LOST, flag_names
 from rig.errors import DaqError, as_daq_error
+from rig.tick.kernels import tick_block
 from rig.tick.safety.layout import GuardMode
 from rig.tick.safety.limits import end_reason_of
 from rig.tick.tick import Tick
+from vibrolock.compiled import bound
 
 Block: TypeAlias = tuple[np.ndarray, np.ndarray]
 """A block of inputs, V [n, n_channels], and the device's flags [n]."""
@@ -64,6 +67,12 @@ class DrivenLoop:
                 self.failure = self.failure or as_daq_error(error)
             except BaseException as error:
                 self.interruption = self.interruption or error
+
+    def _bound_tick(self, readings: np.ndarray, rows: np.ndarray) -> Callable[..., None]:
+        """`tick_block` for blocks of the device and these arrays for readings and rows, which are not changed."""
+        daq = self.daq
+        inputs, told = np.empty((daq.block, len(daq.channels))), (daq.put_out, daq.continuation)
+        return bound(tick_block, self.tick.arrays, inputs, daq.flags, readings, rows, self._voltages, *told)
 
     def _keep_counters(self) -> None:
         if self._counted is None:

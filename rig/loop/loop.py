@@ -11,7 +11,6 @@ import numpy as np
 from rig.daq import DAQ
 from rig.loop.driven_loop import DrivenLoop
 from rig.text.json_values import JsonObject
-from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
 
@@ -144,9 +143,7 @@ class Loop(DrivenLoop):
         if self._fused is not None:
             self._fused.run_fused(self.tick.arrays, readings, rows)
         else:
-            nothing = np.empty((0, len(self.daq.channels)))
-            daq, none = self.daq, np.empty(0)
-            tick_block(self.tick.arrays, nothing, daq.flags, readings, rows, none, daq.put_out, daq.continuation)
+            self._tick_block = self._bound_tick(readings, rows)
 
     @property
     def over(self) -> bool:
@@ -171,13 +168,13 @@ class Loop(DrivenLoop):
     def _advance(self, readings: np.ndarray, rows: np.ndarray) -> int:
         if self._fused is not None:
             return self._fused.run_fused(self.tick.arrays, readings, rows)
-        block = self.daq.block
+        block, tick_block = self.daq.block, self._tick_block
+        told = self.daq.put_out, self.daq.continuation
         for first in range(0, rows.size, block):
             swapped = self._swap()
             if swapped is None:
                 return first
             part = slice(first, first + block)
-            told = self.daq.put_out, self.daq.continuation
             tick_block(self.tick.arrays, *swapped, readings[part], rows[part], self._voltages, *told)
             if self.over:
                 return first + block

@@ -13,6 +13,7 @@ from rig.errors import ConfigurationError
 from rig.tick.layout import HISTORY, LOOP, ROW, TickArrays, recorded_row
 from rig.tick.safety.expected import expected_record
 from rig.tick.safety.kernels import is_over
+from rig.tick.safety.layout import GuardMode
 from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
 from rig.tick.safety.response_plausibility import PLAUSIBILITY, evaluate_exciter
 from rig.tick.sequencer.judgement import SETTLING
@@ -164,6 +165,10 @@ class Tick:
     @property
     def over(self) -> bool:
         """Whether the output is off for good and the device's queue holds no more output of the run."""
+        if (
+            self.arrays.guard["mode"][0] != GuardMode.OFF
+        ):  # asked after every block, which a kernel's call would outlast
+            return False
         return is_over(self.arrays.guard[0], int(self.arrays.loop["delay_whole"][0]))
 
     def request_stop(self) -> None:

@@ -14,10 +14,8 @@ from rig.loop.driven_loop import DrivenLoop
 from rig.loop.worker.memory import RELEASE_START, START_JUDGED, STOP, SharedMemory, Slot
 from rig.loop.worker.pace import pace_of
 from rig.loop.worker.times import BlockTimes, disturbances, since
-from rig.tick.kernels import tick_block
 from rig.tick.safety.layout import GuardMode
 from rig.tick.tick import Tick
-from vibrolock.compiled import bound
 
 CHUNK_DONE = b"."
 """Message to the campaign with every chunk."""
@@ -68,18 +66,7 @@ class WallClockLoop(DrivenLoop):
         spread = memory.layout.chunk >= len(chores) * daq.block
         self._chores = dict(enumerate(chores)) if spread else {0: self._all_chores}
         slot, block = memory.to_fill(), daq.block
-        inputs = np.empty((block, len(daq.channels)))
-        self._tick_block = bound(
-            tick_block,
-            tick.arrays,
-            inputs,
-            daq.flags,
-            slot.readings[:block],
-            slot.rows[:block],
-            self._voltages,
-            daq.put_out,
-            daq.continuation,
-        )
+        self._tick_block = self._bound_tick(slot.readings[:block], slot.rows[:block])
         self._samples = 0
         self.disturbances: dict[str, int] = {}
 

@@ -1,6 +1,7 @@
 """JSON Schemas of benches, plans and virtual rigs: they accept what the program accepts, and refuse what they can express."""
 
 import copy
+import functools
 import json
 import tomllib
 
@@ -24,6 +25,7 @@ BENCHES, PLANS = ROOT / "rig" / "bench" / "shipped", ROOT / "rig" / "campaigns" 
 SPECIMENS = ROOT / "simulators" / "specimens"
 
 
+@functools.cache
 def of(name):
     return jsonschema.Draft7Validator(schema_of(name))
 
@@ -43,7 +45,7 @@ def plan_table(name="magnet-beam/backbone"):
 
 @pytest.mark.parametrize("name", schema_names())
 def test_a_schema_is_one_of_draft_7_and_nothing_in_it_is_beyond_that_draft(name):
-    schema = schema_of(name)
+    schema = of(name).schema
     jsonschema.Draft7Validator.check_schema(schema)
     text = json.dumps(schema)
     for word in ('"$defs"', '"prefixItems"', '"discriminator"', '"type": "null"', '"unevaluatedProperties"'):
@@ -64,7 +66,7 @@ def inner(node):
 
 @pytest.mark.parametrize("name", schema_names())
 def test_a_reference_stands_alone_and_leads_somewhere(name):
-    schema = schema_of(name)
+    schema = of(name).schema
     for node in inner(schema):
         if isinstance(node.get("$ref"), str):
             assert set(node) == {"$ref"}  # a reader of draft 7 ignores what stands beside it
@@ -73,7 +75,7 @@ def test_a_reference_stands_alone_and_leads_somewhere(name):
 
 @pytest.mark.parametrize("name", schema_names())
 def test_every_key_has_a_description_and_a_title(name):
-    schema = schema_of(name)
+    schema = of(name).schema
     tables = [node for node in inner(schema) if node.get("additionalProperties") is False]
     assert tables
     for table in tables:
@@ -83,7 +85,7 @@ def test_every_key_has_a_description_and_a_title(name):
 
 
 def test_titles_have_units_and_keys_their_defaults_and_ranges():
-    limits = schema_of("bench")["definitions"]["LimitsChanges"]["properties"]
+    limits = of("bench").schema["definitions"]["LimitsChanges"]["properties"]
     assert limits["voltage_v"]["title"] == "voltage (V)"
     assert limits["slew_v_per_s"]["title"] == "slew (V/s)"
     assert (limits["voltage_v"]["exclusiveMinimum"], limits["voltage_v"]["maximum"]) == (0, 100)
