@@ -6,7 +6,7 @@ from fractions import Fraction
 from vibrolock.errors import InputError
 from vibrolock.quantities import SIGNALS, USUAL, Quantity, quantity
 
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _LEAST, _MOST = 1e-12, 1e12  # of a number: sensors and amplifiers lie inside
 _SENSITIVITY = "a number and its unit as on the data sheet, such as '100 mV/g', '22.4 mV/N', '3.9 pC/N', '1 mm/V'"
 _GAIN = "a number and its unit, such as '10 mV/pC' or '0.1 V/pC' for a charge amplifier, '10' or '10 V/V' for another"

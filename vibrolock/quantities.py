@@ -14,7 +14,7 @@ Exponents = tuple[tuple[str, int], ...]
 """Base units and their exponents, sorted."""
 _LONGEST = 40  # letters of a unit that is read; chosen: whatever is longer is a remark
 _LARGEST_EXPONENT = 9
-_WITH_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,2})?)\s*(\D.*)")
+_WITH_UNIT = re.compile(r"\s*([+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d{1,2})?)\s*(\D.*)")
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ _ANYWHERE = re.compile(r"[\[({<]([^\[\](){}<>]*[^\[\](){}<>\d][^\[\](){}<>]*)[\]
 _BEHIND = re.compile(r".*\S(?:\s+/\s*|,\s*|:\s+|\s+in\s+)(\S[^,]*)$")  # Force / kN; Force, kN; Force in kN
 _LAST_WORD = re.compile(r".*[^\W_](?:[_ /:]|\s)(ms|us|µs|μs|ns|msec|usec|kN|mN|lbf|mV|mm|um|µm|μm)$")  # force_kN
 _IN_NAMES = (*SIGNALS, "s")
+_READ = 200  # letters of a name in which a unit is sought; chosen: the patterns' time grows with their square
 
 Value = (
     None
@@ -128,8 +129,9 @@ def unit_in_name(name: str) -> str:
     """Return a unit of a signal or of time in a name; empty without one.
 
     It is in brackets, ``Force [N]``, behind a sign or a word, ``Force / kN``, ``Force, kN``, ``Force in kN``, or one of several
-    letters that nothing else means, ``force_kN``, ``time_ms``.
+    letters that nothing else means, ``force_kN``, ``time_ms``. Of a long name the last `_READ` letters are looked at.
     """
+    name = name[-_READ:]
     last = [found for pattern in (_IN_BRACKETS, _BEHIND, _LAST_WORD) if (found := pattern.search(name)) is not None]
     for text in (*(found[1] for found in last), *_ANYWHERE.findall(name)):
         known = quantity(text)
@@ -140,7 +142,7 @@ def unit_in_name(name: str) -> str:
 
 def without_unit(name: str) -> str:
     """Return a name without a text in brackets at its end."""
-    return _IN_BRACKETS.sub("", name).strip() or name
+    return (name[:-_READ] + _IN_BRACKETS.sub("", name[-_READ:])).strip() or name
 
 
 def side_by_side(records: Sequence[Float]) -> Float:

@@ -22,8 +22,8 @@ _TRIED: tuple[tuple[Literal[",", ";", "\t", " "], Literal[".", ","]], ...] = (
 )
 """Separators with decimal points or commas, in the order in which they are tried."""
 _NUMBER = {
-    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
-    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$"),
+    ".": re.compile(r"[+-]?(\d++\.?\d*+|\.\d++)([eE][+-]?\d++)?$"),
+    ",": re.compile(r"[+-]?(\d++,?\d*+|,\d++)([eE][+-]?\d++)?$"),
 }
 
 
