@@ -15,20 +15,26 @@ and the largest of three sizes that are a quarter of a step apart. The error of 
 with the fundamental: it is one of the amplitude, not of the phase. Both parts are therefore stated by themselves.
 """
 
+from collections.abc import Callable
+from functools import cache
+
 import numpy as np
 
 from vibrolock.arrays import Complex, Float
 
 JUDGED = 16384
 """Number of samples of a record from which its rounding is judged; a longer record has no more of it."""
-_BLOCK = 1024
+_BLOCK = 2048
 """Samples that are evaluated at once. Chosen: the errors of so many fit the cache of a core."""
 _ORDERS = 6
 """Orders of the harmonics of rounding that are summed, at most. Chosen."""
 _NEGLIGIBLE = 1e-3
 """Size of a harmonic of rounding, in steps of the converter, below which the sum ends. Chosen."""
-_SIZES = (-0.25, 0.0, 0.25)
+_SIZES = np.array([-0.25, 0.0, 0.25])
 """Changes of the peak of the vibration in steps."""
+_ODD = np.array([[1.0, -1.0, 1.0], [0.0, 4.0, -12.0], [0.0, 0.0, 16.0]])
+_EVEN = np.array([[2.0, -4.0, 6.0], [0.0, 8.0, -32.0], [0.0, 0.0, 32.0]])
+"""``sin(n x)/sin(x)`` for n = 1, 3, 5, and that over cos(x) for n = 2, 4, 6: coefficients of 1, cos(x)^2, cos(x)^4, a column each."""
 _SPREAD = np.sqrt(0.5)
 """Standard deviation of a sine of unknown phase over its largest value, as the error is over the size of the vibration. The
 part in quadrature depends on the shape besides, and is not reduced."""
@@ -84,47 +90,83 @@ def _terms(noise_steps: Float) -> Float:
 
 
 def _coefficients(turns: Float, position: Float, terms: Float) -> Complex:
-    """complex[n_channels, sizes, 2, W + 1]: Fourier coefficients of the error in steps, on a step and a quarter above.
+    """complex[n_channels, 2, sizes, W + 1]: Fourier coefficients of the error in steps, on a step and a quarter above.
 
     ``position``, float[n_channels, n], is the vibration in steps.
     """
     peak = np.maximum(np.max(np.abs(position), axis=1), 1e-9)
-    sizes = np.maximum(1.0 + np.divide.outer(np.array(_SIZES), peak), 0.0)
-    sums = np.zeros((2 * sizes.size, 2 * turns.shape[1]))
-    for start in range(0, position.shape[1], _BLOCK):
-        block = slice(start, start + _BLOCK)
-        cosine, sine = _cosine_and_sine(sizes[..., None] * position[:, block])
-        # A quarter of a step above, the turn is a quarter farther.
-        errors = np.stack([_sine_series(cosine, sine, terms), _sine_series(-sine, cosine, terms)])
-        sums += errors.reshape(sums.shape[0], -1) @ turns[:, :, block].reshape(sums.shape[1], -1).T
-    found = (2.0 / position.shape[1]) * (sums[:, : turns.shape[1]] + 1j * sums[:, turns.shape[1] :])
-    found[:, 0] *= 0.5
-    return np.asarray(np.moveaxis(found.reshape(2, *sizes.shape, -1), 2, 0).swapaxes(1, 2))
+    sizes = np.maximum(1.0 + np.multiply.outer(1.0 / peak, _SIZES), 0.0)
+    columns = turns.reshape(-1, turns.shape[2])
+    sums = np.zeros((position.shape[0], 2, len(_SIZES), columns.shape[0]))
+    for total, scale, where, sines in zip(sums, sizes, position, terms.T, strict=True):
+        factors = _in_cosine(sines)
+        for start in range(0, where.size, _BLOCK):
+            block = slice(start, start + _BLOCK)
+            errors = _errors(np.multiply.outer(scale, where[block]), factors)
+            total += (errors.reshape(-1, errors.shape[2]) @ columns[:, block].T).reshape(total.shape)
+    found = (2.0 / position.shape[1]) * (sums[..., : turns.shape[1]] + 1j * sums[..., turns.shape[1] :])
+    found[..., 0] *= 0.5
+    return np.asarray(found)
 
 
-def _cosine_and_sine(turns: Float) -> tuple[Float, Float]:
-    """Cosine and sine of a number of turns: the sine of a quarter of the angle, within an eighth of a turn, gives both."""
-    sine = np.sin(0.5 * np.pi * (turns - np.rint(turns)))
-    squared = 2.0 * sine * sine
-    sine_of_half, cosine_of_half = 2.0 * sine * np.sqrt(1.0 - 0.5 * squared), 1.0 - squared
-    return 1.0 - 2.0 * sine_of_half**2, 2.0 * sine_of_half * cosine_of_half
+def _in_cosine(terms: Float) -> tuple[Float, Float]:
+    """Coefficients of P and Q in ``sum_n terms[n - 1] sin(n x) = sin(x) (P(c^2) + c Q(c^2))``, c = cos(x), as many as matter."""
+    orders = int(np.count_nonzero(terms))
+    odd, even = (orders + 1) // 2, orders // 2
+    return _ODD[:odd, :odd] @ terms[: 2 * odd : 2], _EVEN[:even, :even] @ terms[1 : 2 * even : 2]
 
 
-def _sine_series(cosine: Float, sine: Float, terms: Float) -> Float:
-    """``sum_n terms[n - 1] sin(n x)`` from cosine and sine of x (Clenshaw); ``terms`` is float[orders, n_channels]."""
-    double = 2.0 * cosine
-    above, last = np.zeros_like(cosine), np.zeros_like(cosine) + terms[-1, :, None]
-    for term in terms[-2::-1, :, None]:
-        np.subtract(term, above, out=above)
-        above += double * last
-        above, last = last, above
-    last *= sine
-    return last
+def _errors(turns: Float, factors: tuple[Float, Float]) -> Float:
+    """float[2, *turns.shape]: mean error at a number of ``turns``, which are overwritten, and a quarter of a turn farther."""
+    turns -= np.rint(turns)
+    squared = turns * turns
+    for_sine, for_cosine = _half_angle()
+    half = _polynomial(for_sine, squared)
+    half *= turns
+    cosine, sine = half * half, _polynomial(for_cosine, squared)
+    cosine *= -2.0
+    cosine += 1.0
+    sine *= half
+    sine *= 2.0
+    return np.stack([_series(sine, cosine, factors), _series(cosine, -sine, factors)])
+
+
+def _series(sine: Float, cosine: Float, factors: tuple[Float, Float]) -> Float:
+    squared = cosine * cosine
+    out = _polynomial(factors[0], squared)
+    if factors[1].size:
+        more = _polynomial(factors[1], squared)
+        more *= cosine
+        out += more
+    out *= sine
+    return out
+
+
+@cache
+def _half_angle() -> tuple[Float, Float]:
+    """Polynomials in the square of a number of turns u up to a half: ``sin(pi u)/u`` and ``cos(pi u)``, to 1e-13."""
+    return _fitted(lambda squared: np.pi * np.sinc(np.sqrt(squared)), 6), _fitted(
+        lambda squared: np.cos(np.pi * np.sqrt(squared)), 7
+    )
+
+
+def _fitted(function: Callable[[Float], Float], degree: int) -> Float:
+    fit = np.polynomial.Chebyshev.interpolate(function, degree, domain=(0.0, 0.25))
+    return np.asarray(fit.convert(kind=np.polynomial.Polynomial).coef)
+
+
+def _polynomial(coefficients: Float, x: Float) -> Float:
+    """Value of a polynomial, from its constant up. Numbers in place of arrays of factors: numpy is quicker with them."""
+    out = np.full_like(x, coefficients[-1])
+    for coefficient in coefficients[-2::-1].tolist():
+        out *= x
+        out += coefficient
+    return out
 
 
 def _largest(found: Complex, steps: Complex) -> Complex:
     """complex[n_channels, W + 1]: standard errors in steps from those of each size, in phase and in quadrature."""
     unit = np.divide(steps, np.abs(steps), out=np.ones_like(steps), where=steps != 0.0)
     along = found * np.conj(unit)[:, None, None]
-    in_phase, across = (np.max(np.sum(part**2, axis=2), axis=1) for part in (along.real, along.imag))
+    in_phase, across = (np.max(np.sum(part**2, axis=1), axis=1) for part in (along.real, along.imag))
     return np.asarray(_SPREAD * np.sqrt(in_phase) + 1j * np.sqrt(across))

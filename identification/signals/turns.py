@@ -4,9 +4,6 @@ import numpy as np
 
 from vibrolock.arrays import Float
 
-_BLOCK = 2048
-"""Samples that are computed at once. Chosen: their harmonics fit the cache of a core."""
-
 
 def turns_of(theta_rad: Float, highest: int, out: Float | None = None) -> Float:
     """float[2, highest + 1, n]: cosines and minus sines of the harmonics from 0 up of a phase in float[n].
@@ -19,15 +16,8 @@ def turns_of(theta_rad: Float, highest: int, out: Float | None = None) -> Float:
     if highest:
         np.cos(theta_rad, out=turns[0, 1])
         np.negative(np.sin(theta_rad), out=turns[1, 1])
-    for start in range(0, theta_rad.size, _BLOCK):
-        _fill(turns[:, :, start : start + _BLOCK])
-    return turns
-
-
-def _fill(turns: Float) -> None:
-    """Compute the harmonics from the second up."""
     middle = 1
-    while middle + 1 < turns.shape[1]:
+    while middle < highest:
         more = turns[:, middle + 1 : 2 * middle + 1]
         count = more.shape[1]
         np.multiply(2.0 * turns[0, middle], turns[:, 1 : count + 1], out=more)
@@ -35,3 +25,4 @@ def _fill(turns: Float) -> None:
         more[0] -= below[0]
         more[1] += below[1]
         middle += count
+    return turns
