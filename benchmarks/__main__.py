@@ -79,6 +79,13 @@ def commands() -> Iterator[Ratio]:
             yield Ratio(name, f"starting Python with numpy ({base:.2f} s)", statistics.median(values) / base)
 
 
+def points() -> Iterator[Ratio]:
+    """The evaluation of a settled point."""
+    for bench, found in _json("benchmarks.points", "--json").items():
+        over = "harmonics of its phase times samples"
+        yield Ratio(f"evaluation of a point, {bench}", over, found["evaluation_over_product"])
+
+
 def pnlss() -> Iterator[Ratio]:
     """An iteration of a nonlinear state-space fit."""
     for threads, sizes in _json("benchmarks.pnlss_iteration", "--json").items():
@@ -143,7 +150,7 @@ def put(page: Path, text: str) -> None:
 
 def main(minutes: float = 0.0, page: Path | None = None) -> None:
     """Measure all ratios, with ``minutes`` of the loop by the clock at each rate; print them, and put them into a page."""
-    parts: list[Callable[[], Iterator[Ratio]]] = [commands, loop, pnlss, tables]
+    parts: list[Callable[[], Iterator[Ratio]]] = [commands, loop, points, pnlss, tables]
     if minutes > 0.0 and shutil.which("cyclictest"):
         parts.append(partial(wall_clock, minutes))
     ratios: list[Ratio] = []

@@ -6,6 +6,7 @@ resonance.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -107,7 +108,7 @@ class PeriodicVibration:
         """complex[H + 1]: harmonics of the force, N."""
         return np.asarray(self.harmonics[find_role(self.channels, "force")])
 
-    @property
+    @cached_property
     def drive_m(self) -> Complex:
         """complex[H + 1]: harmonics of the displacement at the drive point, m."""
         return self.displacement_m(self.channels[find_role(self.channels, "drive")].name)

@@ -66,7 +66,7 @@ class Columns:
         samples, lost = self._record.samples(start, stop)
         if lost.any():
             samples = np.where(lost, 0.0, samples)
-        design[lost] = 0.0  # rows of zeros, in the data as well: no effect on the sums of least squares
+            design[lost] = 0.0  # rows of zeros, in the data as well: no effect on the sums of least squares
         return Stretch(theta, design, finite("samples", samples).T, lost)
 
     def _repeating(self, start: int, stop: int) -> Float:
@@ -82,26 +82,41 @@ class Columns:
         It is fitted to the deviation of the phase from its moving mean over one period, so that slow variations remain.
         """
         straight = self._straight.read(0, 2)
-        period = round(2.0 * np.pi / (straight[1] - straight[0]))
+        step = float(straight[1] - straight[0])
+        period = round(2.0 * np.pi / step)
         size = self.count - period + 1
-        normal: Float | float = 0.0
         right: Float | float = 0.0
         for start, stop in spans(size):
             end = stop + period - 1
             away = self._phase.read(start, end) - self._straight.read(start, end)
-            mean = np.convolve(away, np.full(period, 1.0 / period), mode="valid")
+            sums = np.cumsum(away)
+            mean = sums[period - 1 :] / period
+            mean[1:] -= sums[:-period] / period
             inside = slice(period // 2, period // 2 + mean.size)
             weight = _hanning(start, stop, size)  # without it the ends of a slow variation leak into the fit
-            columns = self._repeating(start, end)[inside] * weight[:, None]
-            normal = normal + columns.T @ columns
-            right = right + columns.T @ ((away[inside] - mean) * weight)
-        return least_squares(np.asarray(normal), np.asarray(right))
+            right = right + self._repeating(start, end)[inside].T @ ((away[inside] - mean) * weight**2)
+        middle = float(straight[0]) + step * (period // 2 + 0.5 * (size - 1))
+        return least_squares(even_products(middle, step, size, self._harmonics), np.asarray(right))
+
+
+def even_products(middle: float, step: float, size: int, harmonics: int) -> Float:
+    """float[2 H + 1, 2 H + 1]: products of cosines from 1 up and minus sines from 0 up, weighted by the square of `_hanning`.
+
+    They come from sums of ``exp(i m theta)`` over samples whose phase advances by ``step``, to either side of ``middle``. The
+    square of the weight is a sum of five exponentials, with which the sums are geometric.
+    """
+    orders = np.arange(harmonics + 1)
+    half = 0.5 * step * np.arange(2 * harmonics + 1)[:, None] + np.pi / (size - 1) * np.arange(-2, 3)
+    kernels = np.divide(np.sin(size * half), np.sin(half), out=np.full(half.shape, float(size)), where=half != 0.0)
+    sums = np.exp(1j * middle * np.arange(2 * harmonics + 1)) * (kernels @ (np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 16.0))
+    above, apart = sums[orders[:, None] + orders], orders[:, None] - orders
+    below = np.where(apart < 0, np.conj(sums[abs(apart)]), sums[abs(apart)])
+    cosines, sines, mixed = (above + below).real, (below - above).real, (below - above).imag[1:]
+    return 0.5 * np.block([[cosines[1:, 1:], mixed], [mixed.T, sines]])
 
 
 def _hanning(start: int, stop: int, size: int) -> Float:
     """``np.hanning(size)[start:stop]``."""
-    if size == 1:
-        return np.ones(1)
     return np.asarray(
         0.5 + 0.5 * np.cos(np.pi * np.arange(1.0 - size + 2 * start, 1 - size + 2 * stop, 2) / (size - 1))
     )

@@ -238,7 +238,7 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
         for batch, (start, stop) in enumerate(pairwise(edges)):
             if stop > start:
                 sums[batch] += chunk.design[start:stop, :columns].T @ residual[start:stop]
-                known[batch] += int((~chunk.lost[start:stop]).sum())
+                known[batch] += stop - start - np.count_nonzero(chunk.lost[start:stop])
         thirds = np.diff(residual, 3, axis=0)
         rough += np.einsum("kc,kc->c", thirds, thirds) / _THIRD_DIFFERENCES
         squares += np.sum(np.multiply(residual, residual, out=residual), axis=0)
@@ -256,7 +256,8 @@ def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[
     residual = chunk.data[:JUDGED] - chunk.design[:JUDGED] @ solution
     per_period = 2.0 * np.pi * (theta.size - 1) / (theta[-1] - theta[0])
     first, last = coefficients.shape[1], min(_SHAPE_HARMONICS, int(_BELOW_HALF * per_period))
-    turns = turns_of(theta, max(last, first - 1))
+    lower = chunk.design.T[:-2, :JUDGED].reshape(2, first, theta.size)
+    turns = turns_of(theta, max(last, first - 1), lower=lower)
     real, imaginary = turns[:, first:] @ residual
     return turns, np.hstack([coefficients, (real + 1j * imaginary).T * (2.0 / theta.size)])
 

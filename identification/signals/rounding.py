@@ -34,7 +34,7 @@ _SIZES = np.array([-0.25, 0.0, 0.25])
 """Changes of the peak of the vibration in steps."""
 _ODD = np.array([[1.0, -1.0, 1.0], [0.0, 4.0, -12.0], [0.0, 0.0, 16.0]])
 _EVEN = np.array([[2.0, -4.0, 6.0], [0.0, 8.0, -32.0], [0.0, 0.0, 32.0]])
-"""``sin(n x)/sin(x)`` for n = 1, 3, 5, and that over cos(x) for n = 2, 4, 6: coefficients of 1, cos(x)^2, cos(x)^4, a column each."""
+"""``sin(n x)/sin(x)`` for n = 1, 3, 5, and that over cos(x) for n = 2, 4, 6: factors of 1, cos(x)^2, cos(x)^4 in columns."""
 _SPREAD = np.sqrt(0.5)
 """Standard deviation of a sine of unknown phase over its largest value, as the error is over the size of the vibration. The
 part in quadrature depends on the shape besides, and is not reduced."""
@@ -96,28 +96,30 @@ def _coefficients(turns: Float, position: Float, terms: Float) -> Complex:
     """
     peak = np.maximum(np.max(np.abs(position), axis=1), 1e-9)
     sizes = np.maximum(1.0 + np.multiply.outer(1.0 / peak, _SIZES), 0.0)
+    factors = [_in_cosine(sines) for sines in terms.T]
     columns = turns.reshape(-1, turns.shape[2])
-    sums = np.zeros((position.shape[0], 2, len(_SIZES), columns.shape[0]))
-    for total, scale, where, sines in zip(sums, sizes, position, terms.T, strict=True):
-        factors = _in_cosine(sines)
-        for start in range(0, where.size, _BLOCK):
-            block = slice(start, start + _BLOCK)
-            errors = _errors(np.multiply.outer(scale, where[block]), factors)
-            total += (errors.reshape(-1, errors.shape[2]) @ columns[:, block].T).reshape(total.shape)
+    sums = np.zeros((position.shape[0] * 2 * len(_SIZES), columns.shape[0]))
+    for start in range(0, position.shape[1], _BLOCK):
+        block = slice(start, start + _BLOCK)
+        errors = np.empty((position.shape[0], 2, len(_SIZES), columns[0, block].size))
+        for scale, where, known, out in zip(sizes, position[:, block], factors, errors, strict=True):
+            _errors(np.multiply.outer(scale, where), known, out)
+        sums += errors.reshape(sums.shape[0], -1) @ columns[:, block].T
+    sums = sums.reshape(*errors.shape[:-1], -1)
     found = (2.0 / position.shape[1]) * (sums[..., : turns.shape[1]] + 1j * sums[..., turns.shape[1] :])
     found[..., 0] *= 0.5
     return np.asarray(found)
 
 
 def _in_cosine(terms: Float) -> tuple[Float, Float]:
-    """Coefficients of P and Q in ``sum_n terms[n - 1] sin(n x) = sin(x) (P(c^2) + c Q(c^2))``, c = cos(x), as many as matter."""
+    """Coefficients of P and Q in ``sum_n terms[n - 1] sin(n x) = sin(x) (P(c^2) + c Q(c^2))``, c = cos(x); those needed."""
     orders = int(np.count_nonzero(terms))
     odd, even = (orders + 1) // 2, orders // 2
     return _ODD[:odd, :odd] @ terms[: 2 * odd : 2], _EVEN[:even, :even] @ terms[1 : 2 * even : 2]
 
 
-def _errors(turns: Float, factors: tuple[Float, Float]) -> Float:
-    """float[2, *turns.shape]: mean error at a number of ``turns``, which are overwritten, and a quarter of a turn farther."""
+def _errors(turns: Float, factors: tuple[Float, Float], out: Float) -> None:
+    """Put mean errors at a number of ``turns``, which are overwritten, and those a quarter of a turn farther, into ``out``."""
     turns -= np.rint(turns)
     squared = turns * turns
     for_sine, for_cosine = _half_angle()
@@ -128,18 +130,18 @@ def _errors(turns: Float, factors: tuple[Float, Float]) -> Float:
     cosine += 1.0
     sine *= half
     sine *= 2.0
-    return np.stack([_series(sine, cosine, factors), _series(cosine, -sine, factors)])
+    _series(sine, cosine, factors, out[0])
+    _series(cosine, np.negative(sine, out=squared), factors, out[1])
 
 
-def _series(sine: Float, cosine: Float, factors: tuple[Float, Float]) -> Float:
+def _series(sine: Float, cosine: Float, factors: tuple[Float, Float], out: Float) -> None:
     squared = cosine * cosine
-    out = _polynomial(factors[0], squared)
+    total = _polynomial(factors[0], squared)
     if factors[1].size:
         more = _polynomial(factors[1], squared)
         more *= cosine
-        out += more
-    out *= sine
-    return out
+        total += more
+    np.multiply(total, sine, out=out)
 
 
 @cache

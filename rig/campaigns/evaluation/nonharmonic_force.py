@@ -68,7 +68,8 @@ def _spectrum(bench: Bench, rows: Rows) -> tuple[np.ndarray, np.ndarray] | None:
     force = bridged(rows, slice(channel, channel + 1))[:, 0]
     turns = 2.0 * math.pi * np.arange(force.size) / force.size
     window = np.polynomial.chebyshev.chebval(np.cos(turns), WINDOW)  # cos(k x) = T_k(cos x)
-    power = np.abs(np.fft.rfft(window * (force - force.mean()))) ** 2
+    lines = np.fft.rfft(window * (force - force.mean()))
+    power = lines.real**2 + lines.imag**2
     orders = np.arange(power.size) / (periods * force.size / (force.size - 1))
     between = np.abs(orders - np.rint(orders)) > MAIN_LOBE / periods
     kept = orders > 0.5

@@ -6,6 +6,7 @@ import pytest
 from identification import Channel, IdentificationError, periodic_vibration
 from identification.signals import chunks
 from identification.signals.chunks import ArrayRecord, Line, Phase
+from identification.signals.columns import even_products
 from tests.refused import refused
 
 RATE_HZ, FREQUENCY_HZ = 5000.0, 24.37
@@ -105,3 +106,11 @@ def test_a_record_of_many_chunks_gives_the_fundamentals_that_it_was_made_of():
     assert np.all(error < 5.0 * found.harmonics_std[:, 1] + 1e-5 * np.abs(expected))  # what a ripple of 1e-3 rad leaves
     assert abs(abs(found.harmonics[1, 3]) - 0.1) < 5.0 * found.harmonics_std[1, 3]
     np.testing.assert_allclose(found.residual_rms, 1e-3, rtol=0.01)
+
+
+@pytest.mark.parametrize(("size", "step"), [(30, 0.4), (2001, 0.07), (65_000, 0.31)])
+def test_the_products_of_harmonics_of_an_even_phase_are_their_sums(size, step):
+    middle, orders = 0.7, np.arange(6)
+    theta = np.outer(middle + step * (np.arange(size) - 0.5 * (size - 1)), orders)
+    columns = np.hanning(size)[:, None] * np.hstack([np.cos(theta)[:, 1:], -np.sin(theta)])
+    np.testing.assert_allclose(even_products(middle, step, size, 5), columns.T @ columns, atol=1e-12 * size)

@@ -122,7 +122,9 @@ def test_steps_and_noise_that_do_not_fit_are_named(name: str, values: list[float
 
 def test_turns_are_powers_of_the_first_and_lower_harmonics_alone_have_the_same_errors() -> None:
     angles = np.outer(np.arange(31), THETA)
-    np.testing.assert_allclose(turns_of(THETA, 30), [np.cos(angles), -np.sin(angles)], atol=1e-11)
+    for lower in (None, turns_of(THETA, 7), turns_of(THETA, 30)):
+        found = turns_of(THETA, 30, lower=lower)
+        np.testing.assert_allclose(found, [np.cos(angles), -np.sin(angles)], atol=1e-11)
     given = turns_of(THETA, 3), 9.6 * HARMONICS[None], np.ones(1), np.array([0.05])
     np.testing.assert_allclose(rounding_errors(*given, 2), rounding_errors(*given)[:, :3], rtol=1e-12)
 
