@@ -45,7 +45,7 @@ def run(
 
         options = replace(options, check=checked_scale(check, chosen))
     options = _with_rehearsal(options, rehearsal, override_rehearsal)
-    _carry(loaded.kind, options, lambda watched: run_plan(loaded, chosen, output, watched), json)
+    _carry(loaded.kind, options, lambda watched: run_plan(loaded, chosen, output, watched), json, plan)
 
 
 @with_options(of_a_further_part, monitored=True)
@@ -93,7 +93,9 @@ def _with_rehearsal(options: "RunOptions", rehearsal: Path | None, override: str
     return replace(options, override_rehearsal=override)
 
 
-def _carry(kind: str, options: "RunOptions", start: "Callable[[RunOptions], Recording]", json: bool) -> None:
+def _carry(
+    kind: str, options: "RunOptions", start: "Callable[[RunOptions], Recording]", json: bool, source: str = ""
+) -> None:
     """Run, show each point and how the run ended; exit with status 1 if the plan was not completed."""
     from rig.campaigns.kinds import KINDS
     from rig.recording.reader import Recording
@@ -116,6 +118,15 @@ def _carry(kind: str, options: "RunOptions", start: "Callable[[RunOptions], Reco
     if json:
         print_json(summary)
     else:
-        say_how_it_ended(summary, path)
+        say_how_it_ended(summary, path, _pure_plan(source))
     if not complete:
         raise typer.Exit(1)
+
+
+def _pure_plan(source: str) -> str:
+    """Say how the plan ``source`` is carried out under a force that is a sine."""
+    from rig.campaigns.plans import shipped_plans
+
+    pure = f"{source}-pure"
+    how = f"the plan {pure}" if pure in shipped_plans() else "a table [controller.harmonics] in the plan"
+    return f"{how} makes the force a sine, which avoids force harmonics"

@@ -12,23 +12,30 @@ POLL_S = 0.02  # s between two looks at the runs; chosen: shorter than a person 
 
 def stop(
     file: Annotated[
-        Path | None, typer.Argument(help="Recording of the run to stop; every run of yours if left out.")
+        Path | None,
+        typer.Argument(
+            help="Recording of the run to stop. If left out: every run of yours; on a terminal you are asked."
+        ),
     ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Stop every run of yours, without a question.")] = False,
     timeout: Annotated[
         float | None,
         typer.Option(metavar="S", help="Longest time to wait for 0 V; the run's ramp and 10 s if left out.", min=0.0),
     ] = None,
 ) -> None:
     """Ramp runs down and wait until their output is at 0 V; status 1 if that is not known of all. No emergency stop."""
-    from rig.errors import RecordingError
+    from rig.cli.which_run import asked_for
+    from rig.errors import ConfigurationError, RecordingError
     from rig.live.place import base_folder, runs
     from rig.live.reader import left_behind, run_into
     from rig.monitor.shutdown_monitor import ShutdownMonitor
     from vibrolock.printable import printable
 
     base_folder()  # says what is wrong with it
+    if file is not None and every:
+        raise ConfigurationError(f"{file}: given with --all, allowed is one of the two")
     if file is None:
-        folders = runs()
+        folders = runs() if every else asked_for(runs())
     else:
         found = run_into(file)
         folders = [] if found is None else [found.folder]

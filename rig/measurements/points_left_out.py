@@ -5,6 +5,7 @@ from collections import Counter
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.plans import plan_from
 from rig.recording.reader import Recording
+from rig.text.levels import level_text
 
 _NOT_REACHED = "the recording ended before it"
 
@@ -25,7 +26,7 @@ def points_left_out(recording: Recording) -> tuple[str, ...]:
         return ()
     planned, lost = (Counter(target.level for target, _ in some) for some in (results, out))
     unit = plan.level_unit
-    where = ", ".join(f"{lost[level]} of {planned[level]} at {level:g} {unit}" for level in sorted(lost))
+    where = ", ".join(f"{lost[level]} of {planned[level]} at {level_text(level, unit, 'g')}" for level in sorted(lost))
     first = out[0][1]
     reason = _NOT_REACHED if first is None else first.reason
     return (

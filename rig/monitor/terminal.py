@@ -15,6 +15,7 @@ from rich.text import Text
 from rig.live.facts import Line, RunFacts
 from rig.monitor.shown import Details, Shown
 from rig.monitor.words import duration, event_text, figure, point_cells, point_headings, share_word
+from rig.text.levels import in_shown_unit, level_text
 from vibrolock.printable import printable
 
 if TYPE_CHECKING:
@@ -144,8 +145,10 @@ def _replayed(replay: "ReplayState", width: int) -> Text:
 
 def _numbers(state: str, now: Details, facts: RunFacts, *, across: int) -> list[RenderableType]:
     """Return numbers with their units, so many in a line, and a line on the loop where that is known."""
-    unit = facts.level_unit
-    to = f", to {now.target:.4g} {unit}" if math.isfinite(now.target) and now.guard == "armed" else ""
+    level, unit = in_shown_unit(now.level, facts.level_unit)
+    to = (
+        f", to {level_text(now.target, facts.level_unit)}" if math.isfinite(now.target) and now.guard == "armed" else ""
+    )
     good, needed = now.settled or (0, 0)
     shown = state == "settling" and now.settled is not None
     progress = f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 4)}"
@@ -155,7 +158,7 @@ def _numbers(state: str, now: Details, facts: RunFacts, *, across: int) -> list[
         ("force", figure(now.force_n, ".4f"), "N"),
         ("displacement", figure(now.displacement_mm, ".4f"), "mm"),
         ("voltage", figure(now.voltage_v, ".4f"), "V"),
-        ("level", figure(now.level, ".4g"), unit + to),
+        ("level", figure(level, ".4g"), unit + to),
         ("time", figure(now.time_s, ".1f"), f"s of part {now.part}"),
         ("settled", str(good) if shown else "-", progress if shown else ""),
     ]

@@ -6,6 +6,7 @@ from rig.live.facts import Line, RunFacts, number_in, text_in
 from rig.monitor.shown import Shown
 from rig.text.column import Column
 from rig.text.console import number
+from rig.text.levels import in_shown_unit
 from vibrolock.printable import one_line, printable
 
 CLOSE = 0.8
@@ -48,7 +49,7 @@ def state_text(shown: Shown, facts: RunFacts) -> str:
     elif now.point > 0:
         parts.append(f"point {now.point} of {now.points}")
     parts += [
-        f"level {figure(now.level, '.4g')} {facts.level_unit}",
+        " ".join(("level", *_level(now.level, facts))),
         f"{figure(now.frequency_hz, '.4f')} Hz",
         f"phase error {figure(now.phase_error_deg, '.2f')} deg",
         f"{figure(now.force_n, '.4f')} N",
@@ -62,6 +63,12 @@ def state_text(shown: Shown, facts: RunFacts) -> str:
     return "  ".join([*parts, f"{duration(now.left_s)} left"])
 
 
+def _level(level: float, facts: RunFacts) -> tuple[str, str]:
+    """Return a level and its unit as texts."""
+    value, unit = in_shown_unit(level, facts.level_unit)
+    return figure(value, ".4g"), unit
+
+
 def _columns(facts: RunFacts) -> list[Column]:
     return [column for column in facts.columns if column.in_line and not column.optional]
 
@@ -69,12 +76,12 @@ def _columns(facts: RunFacts) -> list[Column]:
 def point_headings(facts: RunFacts) -> list[str]:
     """Return the headings of `point_cells`, with units."""
     quantities = [f"{column.heading} {column.unit}".strip() for column in _columns(facts)]
-    return ["point", f"level {facts.level_unit}", *quantities, "quality"]
+    return ["point", f"level {in_shown_unit(0.0, facts.level_unit)[1]}", *quantities, "quality"]
 
 
 def point_cells(point: Line, facts: RunFacts) -> list[str]:
     """Return number, level, the quantities of its kind of campaign, and the quality of a point."""
-    cells = [f"{number_in(point, 'number') + 1:.0f}", figure(number_in(point, "level"), ".4g")]
+    cells = [f"{number_in(point, 'number') + 1:.0f}", _level(number_in(point, "level"), facts)[0]]
     for column in _columns(facts):
         value = point.get(column.key)
         if isinstance(value, int | float):
@@ -94,7 +101,7 @@ def point_text(point: Line, facts: RunFacts) -> str:
     ]
     reason = text_in(point, "reason")
     ended = f"{quality}: {one_line(reason)}" if reason not in ("", quality) else quality
-    return "  ".join([f"point {number_}  {level} {facts.level_unit}", *shown, ended])
+    return "  ".join([f"point {number_}  {level} {in_shown_unit(0.0, facts.level_unit)[1]}", *shown, ended])
 
 
 def event_text(line: Line, facts: RunFacts) -> str:

@@ -13,6 +13,7 @@ from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import plan_from
 from rig.errors import RigError
 from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalRequest, Table
+from rig.text.levels import level_text
 from simulators.ensemble import ensemble
 
 GAINS = ("k1", "k2", "frequency_integral_per_s", "response_integral_per_s", "reference_integral_per_s")
@@ -91,7 +92,7 @@ def _levels(plan: Levels, draws: Sequence[Draw]) -> Iterator[Remedy]:
     tripped = [draw.trial.level for draw in draws if draw.trial.tripped and np.isfinite(draw.trial.level)]
     below = [level for level in levels if not tripped or level < min(tripped) * (1.0 - 1e-9)]
     if below and len(below) < len(levels):
-        yield Remedy(f"levels up to {below[-1]:.3g} {plan.level_unit}", {key: [*below]})
+        yield Remedy(f"levels up to {level_text(below[-1], plan.level_unit, '.3g')}", {key: [*below]})
 
 
 def _gains(table: Table) -> Iterator[Remedy]:

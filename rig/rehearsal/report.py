@@ -6,6 +6,7 @@ from pydantic import JsonValue
 
 from rig.rehearsal.rehearsal import Effect, Rehearsal
 from rig.rehearsal.verdict import Proportion, Statistic, Verdict, verdict_of
+from rig.text.levels import in_shown_unit, level_text
 
 MAX_LIMITS, MAX_REASONS, MAX_INFLUENCES = 5, 3, 6
 """Limits, reasons of one refusal, and influences that are printed; chosen: the page fits on a screen."""
@@ -100,9 +101,13 @@ def lines(found: Summary) -> list[str]:
         f"trips           {_proportion(verdict.trips)}",
     ]
     for way in verdict.ways_to_trip:
-        levels = ", ".join(f"{one.count} at {one.level:.4g}" for one in way.levels if not math.isnan(one.level))
+        levels = ", ".join(
+            f"{one.count} at {in_shown_unit(one.level, found.level_unit)[0]:.4g}"
+            for one in way.levels
+            if not math.isnan(one.level)
+        )
         on = f" on channel {way.channel}" if way.channel else ""
-        at = f" ({levels} {found.level_unit})" if levels else ""
+        at = f" ({levels} {in_shown_unit(0.0, found.level_unit)[1]})" if levels else ""
         out.append(f"                {way.cause.lower().replace('_', ' ')}{on}: {way.count} of {way.of}{at}")
     out.append(f"loses the lock  {_proportion(verdict.lost_lock)}")
     out += _point_lines(found)
@@ -143,7 +148,7 @@ def _point_lines(found: Summary) -> list[str]:
         reasons = [f"{count} x {text}" for text, count in list(point.reasons.items())[:MAX_REASONS]]
         if missing := point.qualities.get("not begun"):
             reasons.append(f"{missing} x the run had ended before")
-        head = f"point {point.number + 1} at {point.level:.4g} {found.level_unit}"
+        head = f"point {point.number + 1} at {level_text(point.level, found.level_unit)}"
         out.append(f"                {head}: {_percent(point.accepted.value)} accepted; {'; '.join(reasons)}")
     return out
 

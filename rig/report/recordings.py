@@ -24,6 +24,7 @@ from rig.show.point_table import attempts_refused, point_rows, points_from, show
 from rig.show.summary import summarise_recording
 from rig.show.tables import loop_line, print_findings, print_rehearsal
 from rig.text.console import collected, number
+from rig.text.levels import level_text
 
 
 def recording_chapter(path: Path, pictures: Pictures) -> Chapter:
@@ -95,7 +96,7 @@ def _refused(points: Sequence[Point[object]], summary: Mapping[str, Any]) -> lis
     refused = [point for point in points if not point.accepted]
     if refused:
         rows = [
-            (point_name(p.number), f"{p.level:.4g} {p.level_unit}", str(p.quality), p.reason or str(p.quality))
+            (point_name(p.number), level_text(p.level, p.level_unit), str(p.quality), p.reason or str(p.quality))
             for p in refused
         ]
         blocks.append(Table("Points that are not used", ("point", "level", "quality", "why"), rows))

@@ -6,8 +6,10 @@ from typing import Any
 from rig.campaigns.evaluation.point import Attempt, Point, point_name
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.show.point_warnings import quality_in_short
 from rig.show.progress import value_text
 from rig.text.column import Column
+from rig.text.levels import level_text
 
 
 def points_from(kind: str, tables: Sequence[Mapping[str, Any]]) -> list[Point[object]]:
@@ -30,11 +32,10 @@ def point_rows(points: Sequence[Point[object]], columns: Sequence[Column]) -> li
     return [
         (
             str(point.number + 1),
-            f"{point.level:.4g}",
-            point.level_unit,
+            *level_text(point.level, point.level_unit).split(" ", 1),
             *(value_text(column, point) for column in columns),
             {True: "yes", False: "no", None: "-"}[point.settled],
-            str(point.quality),
+            quality_in_short(point),
         )
         for point in points
     ]

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.stored_point import value_of
+from rig.show.point_warnings import quality_in_short
 from rig.text.console import number
+from rig.text.levels import level_text
 from vibrolock.printable import printable
 
 if TYPE_CHECKING:
@@ -66,7 +68,7 @@ class RunProgress(_StatusLine):
         """Print the line of a point."""
         self._finished = number_done
         of = f"/{total}" if point.number < total else ""  # a changed plan continues the numbering of earlier plans
-        parts = [f"point {point.number + 1:>3}{of}  {point.level:>7.4g} {point.level_unit}"]
+        parts = [f"point {point.number + 1:>3}{of}  {level_text(point.level, point.level_unit, '>7.4g')}"]
         if point.evaluated:
             shown = [c for c in self._columns if c.in_line and not (c.optional and value_of(point, c.key) is None)]
             parts += [_in_a_line(column, point) for column in shown]
@@ -75,7 +77,8 @@ class RunProgress(_StatusLine):
         if point.attempts > 1:
             parts.append(f"attempt {point.attempts}")
         if point.quality is not Quality.GOOD:
-            parts.append(str(point.quality) + (f": {point.reason}" if point.reason not in ("", point.quality) else ""))
+            why = f": {point.reason}" if point.reason not in ("", point.quality) else ""
+            parts.append(quality_in_short(point) + why)
         self._print("  ".join(parts))
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:

@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from rig.arming.run_facts import About, user_name
-from rig.campaigns.evaluation.point import point_name
+from rig.campaigns.evaluation.point import Point, point_name
 from rig.check import report as check_report
 from rig.daq import CONTINUED
 from rig.recording.integrity import VERIFIED
 from rig.results.kinds import KINDS
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
+from rig.show.point_warnings import notes_together, warnings_together, what_warnings_mean
 from rig.text.console import number, print_table
 from rig.text.disorder import LATE_BLOCKS, LATE_FRAMES, OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, disorder_text
 from rig.text.message_pages import where_explained
@@ -24,8 +25,8 @@ _OWN_UNITS = (
 """Ends of the names of counters that do not count samples."""
 
 
-def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
-    """Print how a run ended, its results, its speed, and the warnings counted on the way."""
+def say_how_it_ended(summary: dict[str, Any], path: Path, pure_plan: str = "") -> None:
+    """Print how a run ended, its results, its speed, and its warnings; ``pure_plan``: how a force without harmonics is made."""
     summary = printable_strings(summary)
     path = Path(printable(str(path)))
     loop = summary["loop"]
@@ -36,6 +37,8 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     for line in (summary["skipped"], summary["measured_again"]):
         if line:
             print(line)
+    points = points_from(summary["kind"], summary["points"])
+    print_warnings(points)
     last = summary["parts"][-1] if summary["parts"] else {"tripped": False}
     _print_advice(last)
     _print_where_explained(summary)
@@ -50,6 +53,8 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
         )
     for line in _counted(summary["counters"]):
         print(line)
+    if meaning := what_warnings_mean(points, pure_plan):
+        print(f"note: {meaning}")
 
 
 def _counted(counters: Mapping[str, int]) -> list[str]:
@@ -210,5 +215,12 @@ def print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
     for point in points:
         for line in attempts_refused(point):
             print(f"note: {line}")
-        for warning in point.warnings or ():
-            print(f"warning: {point_name(point.number)}: {warning}")
+    print_warnings(points)
+
+
+def print_warnings(points: Sequence[Point[object]]) -> None:
+    """Print the warnings and notes on points, those that many points have once."""
+    for line in warnings_together(points):
+        print(f"warning: {line}")
+    for line in notes_together(points):
+        print(f"note: {line}")

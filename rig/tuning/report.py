@@ -131,7 +131,7 @@ def lines(tuning: Tuning) -> list[str]:
     out += [line for design in (chosen.design, *chosen.others) for line in _design_lines(design)]
     levels_m, needed_v = tuning.levels.levels_m, tuning.levels.needed_v
     out.append(
-        f"levels         {levels_m[0]:.3g} to {levels_m[-1]:.3g} m in {len(levels_m)} steps, {needed_v[0]:.3g} to "
+        f"levels         {1e3 * levels_m[0]:.3g} to {1e3 * levels_m[-1]:.3g} mm in {len(levels_m)} steps, {needed_v[0]:.3g} to "
         f"{needed_v[-1]:.3g} V on the linear plant; {tuning.levels.why}"
     )
     if tuning.harmonics is not None:

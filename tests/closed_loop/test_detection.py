@@ -112,7 +112,7 @@ def test_a_knock_while_recording_spoils_the_point_and_the_next_is_measured(monke
     plan = plan_of("friction-beam", levels_m=(5e-5, 6e-5), start_v=0.05, record_periods=200, retries=0)
     points, end = points_and_end(plan, bench_with({"block": 5}, "friction-beam"))
     assert [point["quality"] for point in points] == ["disturbed", "good"]
-    assert end["skipped"] == "1 of 2 points skipped: disturbed (5e-05 m)"
+    assert end["skipped"] == "1 of 2 points skipped: disturbed (0.05 mm)"
 
 
 PATIENT = SettleRule(average_periods=20, settled_periods=300, longest_periods=800).model_dump()

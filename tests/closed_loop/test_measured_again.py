@@ -283,7 +283,7 @@ def test_a_knock_that_only_the_evaluation_sees_is_measured_again_after_the_last_
         first, second = points_of(recording)
         assert recording.complete
         assert len(recording.parts) == 2
-        assert recording.parts[0].end["skipped"] == "1 of 2 points skipped: rejected (5e-05 m)"
+        assert recording.parts[0].end["skipped"] == "1 of 2 points skipped: rejected (0.05 mm)"
         assert recording.parts[1].end["skipped"] == ""
     assert first.part == 1
     (attempt,) = first.refused_before

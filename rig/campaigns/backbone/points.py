@@ -11,7 +11,7 @@ from rig.bench.configuration import validated
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import (
-    modal_point,
+    damping_point,
     nonharmonic_objection,
     phase_objection,
     std_objection,
@@ -23,7 +23,13 @@ from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_
 from rig.campaigns.evaluation.recorded import settled_backbone
 from rig.campaigns.evaluation.recorded_flow import SAMPLES_LOST, flagged, recorded_flow
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, shared_columns, vibration_part
+from rig.campaigns.evaluation.vibration_quality import (
+    PURITY_COLUMNS,
+    damping_bias,
+    quality_warnings,
+    shared_columns,
+    vibration_part,
+)
 from rig.campaigns.evaluation.vibrations import measured_with, recorded_vibration, within_periods
 from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Target
@@ -57,7 +63,7 @@ def measure_backbone_point(
         return _short_point(bench, plan, target, rows)
     rows = rows[within_periods(rows, plan.record_periods)]
     vibration = recorded_vibration(bench, rows, plan.harmonics, plan.displacement_lag_deg)
-    return with_settling(modal_point(plan, target, bench, vibration, rows), settling)
+    return with_settling(damping_point(plan, target, bench, vibration, rows), settling)
 
 
 def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Rows) -> Point[object]:
@@ -85,7 +91,7 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Rows) -
         settled=abs(error_deg) <= plan.settle.phase_deg and abs(grown) <= plan.settle.amplitude,
         reason=reason,
         quality=Quality.of(reason),
-        warnings=quality_warnings(bench, found.vibration, rows, held=False),
+        warnings=(*quality_warnings(bench, found.vibration, rows, held=False), *damping_bias(found.vibration)),
         nonharmonic_force=nonharmonic,
         vibration=vibration_part(found.vibration, rows),
         modal=Modal(

@@ -27,7 +27,13 @@ from rig.campaigns.evaluation.point import (
 )
 from rig.campaigns.evaluation.recorded import accepted_points, points_of, recorded_drive_shape
 from rig.campaigns.evaluation.recorded_flow import recorded_flow
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, shared_columns, vibration_part
+from rig.campaigns.evaluation.vibration_quality import (
+    PURITY_COLUMNS,
+    damping_bias,
+    quality_warnings,
+    shared_columns,
+    vibration_part,
+)
 from rig.campaigns.evaluation.vibrations import channels_from, measured_with, vibration_from
 from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Target
@@ -176,7 +182,7 @@ def _point(
         direction="both" if len(covered) == 2 else "up" if "up" in covered else "down",
         reason=reason,
         quality=Quality.of(reason),
-        warnings=quality_warnings(bench, vibration, rows, held=False),
+        warnings=(*quality_warnings(bench, vibration, rows, held=False), *damping_bias(vibration)),
         nonharmonic_force=nonharmonic,
         vibration=vibration_part(vibration, rows),
         modal=Modal(

@@ -10,7 +10,7 @@ from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.decay.plan import DecayPlan
-from rig.campaigns.evaluation.acceptance import modal_point
+from rig.campaigns.evaluation.acceptance import damping_point
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.recorded import (
     accepted_points,
@@ -73,7 +73,7 @@ def measure_decay(bench: Bench, plan: DecayPlan, target: Target, rows: Rows, set
     held = taken[first:release]
     held = held[within_periods(held, plan.record_periods)]
     vibration = recorded_vibration(bench, held, plan.harmonics, plan.displacement_lag_deg)
-    point = modal_point(plan, target, bench, vibration, held)
+    point = damping_point(plan, target, bench, vibration, held)
     try:
         mode = _decay_of(bench, plan, taken).mode()
     except (IdentificationError, ArithmeticError) as error:

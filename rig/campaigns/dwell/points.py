@@ -11,7 +11,7 @@ from identification import IdentificationError
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.dwell.plan import DwellPlan
-from rig.campaigns.evaluation.acceptance import level_error, modal_point
+from rig.campaigns.evaluation.acceptance import damping_point, level_error
 from rig.campaigns.evaluation.drift import relative_change
 from rig.campaigns.evaluation.lost_samples import rms_of_force
 from rig.campaigns.evaluation.point import PART, Point
@@ -95,7 +95,7 @@ def measure_mean(bench: Bench, plan: DwellPlan, target: Target, rows: Rows, sett
         missed, off_level = level_error(
             plan.amplitude_law, target.level, vibration, force_rms_n, plan.accepted_level_error
         )
-        point = modal_point(plan, target, bench, vibration, rows, off_level)
+        point = damping_point(plan, target, bench, vibration, rows, off_level)
     except (IdentificationError, ArithmeticError) as error:  # its length counts all the same
         return replace(not_evaluated(plan, target, error), result=DwellResult(length=length))
     held = HeldLevel(force_rms_n=force_rms_n, level_error=missed)
@@ -130,7 +130,7 @@ def watch_drift(plan: DwellPlan, known: Sequence[Point[object]], point: Point[ob
     }
     result = replace(result, changes=Changes(**{f"{name}_change": change for name, change in changes.items()}))
     point = replace(point, result=result)
-    alarms = [f"alarm: {text}" for text in _beyond(plan, "alarm", changes)]
+    alarms = [f"alarm, {text}" for text in _beyond(plan, "alarm", changes)]
     abort = next(_beyond(plan, "abort", changes), "")
     return point.warned(*alarms) if alarms else point, f"{abort}, after {cycles:.0f} cycles" if abort else ""
 

@@ -14,7 +14,7 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Lock, Point, Quality, planned_point
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.vibration_quality import lag_scatter_deg, quality_warnings, vibration_part
+from rig.campaigns.evaluation.vibration_quality import damping_bias, lag_scatter_deg, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import frequency_scatter, modal_part
 from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.locked import SettledPlan
@@ -115,7 +115,10 @@ def std_objection(frequency: float, accepted_frequency: float, damping: float, a
 def settled_point(
     plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: Rows, level: str = ""
 ) -> Point[object]:
-    """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level."""
+    """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level.
+
+    What concerns damping only is a note.
+    """
     scatter, nonharmonic = frequency_scatter(rows), nonharmonic_force(bench, [rows])
     vibrating = vibration_part(vibration, rows)
     bits = vibrating.voltage_v / bench.output_bit_v
@@ -132,6 +135,7 @@ def settled_point(
         reason=reason,
         quality=Quality.of(reason),
         warnings=quality_warnings(bench, vibration, rows),
+        notes=damping_bias(vibration),
         nonharmonic_force=nonharmonic,
         vibration=vibrating,
         lock=Lock(
@@ -148,6 +152,14 @@ def modal_point(
     """Judge a point as `settled_point` does, and add the modal properties of its vibration."""
     modal = modal_part(vibration, drive_shape(bench, plan.plant))
     return replace(settled_point(plan, target, bench, vibration, rows, level), modal=modal)
+
+
+def damping_point(
+    plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: Rows, level: str = ""
+) -> Point[object]:
+    """Judge a point as `modal_point` does, of a test that asks for damping: what concerns it is a warning."""
+    point = modal_point(plan, target, bench, vibration, rows, level)
+    return replace(point, notes=()).warned(*point.notes)
 
 
 def with_settling(point: Point[object], settling: np.void) -> Point[object]:

@@ -47,6 +47,7 @@ from rig.campaigns.evaluation.lost_samples import rms_of
 from rig.campaigns.evaluation.point import Point, Quality, vibration_of
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
+from rig.text.levels import level_text
 
 REVERSED_DEG = 135.0  # from here on a turn counts as a wrong sign; halfway between 90 and 180
 SWAPPED = 0.1  # deviation of sizes, as a logarithm, from which it is asked whether two channels are swapped
@@ -185,7 +186,7 @@ def _against(bench: Bench, point: Point[object], other: Point[object]) -> tuple[
 
 
 def _level_of(point: Point[object]) -> str:
-    return f"{point.level:.4g} {point.level_unit}"
+    return level_text(point.level, point.level_unit)
 
 
 def _of_a_band(bench: Bench, point: Point[object], before: Sequence[Point[object]]) -> list[Misfit]:

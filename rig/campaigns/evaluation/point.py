@@ -208,7 +208,10 @@ class Point(Generic[Result]):
     quality: Quality
     """Quality of the point."""
     warnings: tuple[str, ...] | None = None
-    """Warnings for the user, one line each; None if nothing was evaluated."""
+    """Warnings for the user, one line each; None if nothing was evaluated. Beside a point stands what is before the first
+    colon."""
+    notes: tuple[str, ...] = ()
+    """Remarks in the form of warnings that do not concern what the test asks for."""
     settle_periods: float | None = None
     """Periods from the end of the ramp until the vibration settled or the point failed."""
     amplitude_drift: float | None = None

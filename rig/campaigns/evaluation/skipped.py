@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from rig.campaigns.evaluation.point import Point
+from rig.text.levels import level_text
 
 
 def skipped_summary(points: Iterable[Point[object]], planned: int) -> str:
@@ -34,7 +35,7 @@ def repeats_summary(points: Iterable[Point[object]]) -> str:
 
 
 def _place(point: Point[object]) -> str:
-    where = [f"{point.level:.4g} {point.level_unit}"]
+    where = [level_text(point.level, point.level_unit)]
     if point.asked_frequency_hz is not None:
         where.append(f"{point.asked_frequency_hz:.6g} Hz")
     if point.asked_phase_lag_deg is not None:

@@ -32,6 +32,8 @@ PURITY_COLUMNS = (
 BIASED_DAMPING = 0.01
 """Power of all higher harmonics over that of the fundamental, above which the two dampings differ too much."""
 OTHER_MODE = 0.1  # a nonlinear resonance this far from the linear one more likely belongs to another mode
+FORCE_HARMONICS = "force harmonics"
+"""How the remark on them begins."""
 SCATTERING_DEG = 5.0  # a larger scatter of the lag indicates a signal that hardly exceeds noise and converter steps
 
 
@@ -70,29 +72,38 @@ def lag_scatter_deg(rows: Rows) -> float:
 
 
 def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: Rows, held: bool = True) -> tuple[str, ...]:
-    """Return warnings about a recorded vibration, one line each. The scatter of a lag that was not ``held`` is ignored."""
+    """Return warnings about a recorded vibration, except about its damping. The scatter of a lag not ``held`` is ignored."""
     out = [*vibration.warnings, *quantisation_warnings(vibration, bench)]
     scatter = lag_scatter_deg(rows) if held else 0.0
     if scatter > SCATTERING_DEG:
         force = bench.channels[bench.index_of("force")]
         bits = vibration.force_n / force.resolution_in_unit
         out.append(
-            f"the lag scatters by {scatter:.1f} deg, trusted up to {SCATTERING_DEG:g}: too little signal "
-            f"(force {vibration.force_n:.3g} N, {bits:.1f} steps of its converter), or too quick a detector"
+            f"the lag scatters by {scatter:.1f} deg: trusted up to {SCATTERING_DEG:g}; too little signal (force "
+            f"{vibration.force_n:.3g} N, {bits:.1f} steps of its converter), or too quick a detector"
         )
     linear_hz = bench.specimen.linear_frequency_hz
     if math.isfinite(scatter) and abs(vibration.frequency_hz / linear_hz - 1.0) > OTHER_MODE:
         out.append(
-            f"locked at {vibration.frequency_hz:.4g} Hz, more than {100.0 * OTHER_MODE:g} % from "
-            f"specimen.linear_frequency_hz = {linear_hz:g}: another mode looks the same to a phase"
-        )
-    share = purity(vibration).harmonic_power
-    if share is not None and abs(share) > BIASED_DAMPING:
-        out.append(
-            f"harmonics of the force bias the damping: the whole power gives {100.0 * share:+.1f} % against that of the "
-            f"fundamental, trusted up to {100.0 * BIASED_DAMPING:g} %"
+            f"perhaps another mode at {vibration.frequency_hz:.4g} Hz: more than {100.0 * OTHER_MODE:g} % from "
+            f"specimen.linear_frequency_hz = {linear_hz:g}, and another mode looks the same to a phase"
         )
     return tuple(out)
+
+
+def damping_bias(vibration: PeriodicVibration) -> tuple[str, ...]:
+    """Return a remark if damping from all harmonics of the force differs from that of the fundamental; empty if it does not.
+
+    It is a warning where a test asks for damping, and a note where it does not.
+    """
+    share = purity(vibration).harmonic_power
+    if share is None or not abs(share) > BIASED_DAMPING:
+        return ()
+    size, side = f"{100.0 * abs(share):.1f} %", "lower" if share < 0.0 else "higher"
+    return (
+        f"{FORCE_HARMONICS} (damping ±{size}): damping from all harmonics is {size} {side} than from the fundamental "
+        f"(warning above {100.0 * BIASED_DAMPING:g} %)",
+    )
 
 
 def vibration_part(vibration: PeriodicVibration, rows: Rows) -> Vibration:

@@ -208,8 +208,8 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
         bits = abs(harmonics[1]) / channel.resolution_in_unit
         if channel.role in ("force", "drive") and bits < FEW_BITS:
             out.append(
-                f"channel {channel.name}: an amplitude of {bits:.1f} steps of its converter; "
-                "rounding is most of the error bounds"
+                f"{channel.name} of {bits:.1f} converter steps: that is little for an amplitude, and rounding is most of "
+                "the error bounds"
             )
     return out
 

@@ -11,6 +11,7 @@ from rig.campaigns.planning.plan import Plan, Target
 from rig.errors import ConfigurationError
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
+from rig.text.levels import level_text
 from rig.tick.sequencer.layout import Outcome
 from rig.tick.tick import Tick
 
@@ -31,7 +32,7 @@ class TrippedAt(NamedTuple):
     @property
     def text(self) -> str:
         """The level with its unit."""
-        return f"{self.level:.4g} {self.level_unit}{' at the start' if self.start else ''}"
+        return level_text(self.level, self.level_unit) + (" at the start" if self.start else "")
 
 
 def tripped_at(tick: Tick, plan: Plan, targets: Sequence[Target]) -> TrippedAt | None:

@@ -15,6 +15,7 @@ from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import (
     FINE_AMPLITUDE,
     PURITY_COLUMNS,
+    damping_bias,
     quality_warnings,
     shared_columns,
     vibration_part,
@@ -61,6 +62,7 @@ def measure_stepped_sine_point(
         reason=reason,
         quality=Quality.of(reason),
         warnings=quality_warnings(bench, vibration, rows),
+        notes=damping_bias(vibration),
         nonharmonic_force=nonharmonic,
         vibration=vibration_part(vibration, rows),
         result=SteppedSineResult(phase_lag_deg=vibration.phase_lag_deg, level_error=missed),

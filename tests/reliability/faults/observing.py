@@ -30,7 +30,7 @@ from tests.rig.rigs import bench_with
 DEVICES = {"virtual": VirtualRigInProcess, "emulated": EmulatedRig}
 SPOILT = (0.05, 0.001, 0.03)  # of a channel's true fundamental, of the modal frequency, of the damping
 SEED = 3
-NO_WORD = ("quantisation is not in the error bounds", "harmonics of the force bias", "the lag scatters")
+NO_WORD = ("quantisation is not in the error bounds", "force harmonics", "the lag scatters")
 """Warnings that a sound test may have: they tell of little signal or of the structure, not of a fault."""
 
 

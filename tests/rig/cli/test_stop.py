@@ -113,6 +113,7 @@ def test_of_two_runs_the_named_one_is_stopped_and_then_all(command, running):
 def test_without_a_run_one_line_says_so(command):
     assert command("stop") == (1, "", "rig: no run is under way\n")
     assert command("stop run.h5") == (1, "", "rig: run.h5: no run into this file is under way\n")
+    assert command("stop run.h5 --all") == (1, "", "rig: run.h5: given with --all, allowed is one of the two\n")
     (status, out, err) = command("stop --timeout -1")
     assert (status, out) == (2, "")
     assert "timeout" in err
@@ -227,3 +228,62 @@ def test_on_a_terminal_a_run_is_drawn_and_its_end_stays_to_be_read(running):
     assert " Hz" in shown
     last = shown.split("\x1b[?1049l")[-1]  # back on the screen that was there before
     assert "stopped by `rig stop`" in last
+
+
+class Terminal:
+    """A command on a terminal of its own, which can be typed on."""
+
+    def __init__(self, *arguments):
+        self.leader, follower = pty.openpty()
+        self.child = subprocess.Popen(
+            [*RIG, *arguments], stdin=follower, stdout=follower, stderr=follower, start_new_session=True
+        )
+        os.close(follower)
+        self.shown = ""
+
+    def until(self, text):
+        while text not in self.shown:
+            self.shown += os.read(self.leader, 65536).decode(errors="replace")
+
+    def type(self, text):
+        os.write(self.leader, text.encode())
+
+    def close(self):
+        with suppress(OSError):  # the terminal is gone with the last process that has it open
+            while data := os.read(self.leader, 65536):
+                self.shown += data.decode(errors="replace")
+        os.close(self.leader)
+        return self.child.wait(120)
+
+
+@pytest.mark.slow
+def test_on_a_terminal_two_runs_are_listed_and_the_chosen_one_is_stopped_or_all_unanswered(running):
+    one, other = running("one.h5"), running("other.h5")
+    terminal = Terminal("stop")
+    terminal.until("Which one?")
+    listed = re.search(r"(\d)  \S+/one\.h5 \(process \d+\): backbone on magnet-beam, since ", terminal.shown)
+    terminal.type("7\n")
+    terminal.until("'7' is none of 1 to 2; which one?")
+    terminal.type(f"{listed[1]}\n")
+    assert terminal.close() == 0
+    assert re.findall(r"(\w+)\.h5 \(process \d+\): output", terminal.shown) == ["one"]
+    one.communicate(timeout=120)
+    assert driven("other.h5")
+    another = running("another.h5")
+    began = time.monotonic()
+    silent = Terminal("stop")
+    assert silent.close() == 0
+    assert time.monotonic() - began > 5.0
+    assert "no answer: all are stopped" in silent.shown
+    assert sorted(re.findall(r"(\w+)\.h5 \(process \d+\): output", silent.shown)) == ["another", "other"]
+    for child in (other, another):
+        child.communicate(timeout=120)
+
+
+@pytest.mark.slow
+def test_all_are_stopped_without_a_question_by_all(running):
+    running("one.h5"), running("other.h5")
+    terminal = Terminal("stop", "--all")
+    assert terminal.close() == 0
+    assert "Which one?" not in terminal.shown
+    assert len(re.findall("output at 0 V", terminal.shown)) == 2
