@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
+    from identification.mapping.base import MeasurementMapping as MeasurementMapping
     from identification.mapping.instants import EvenSampling as EvenSampling, even_sampling as even_sampling
     from identification.mapping.time_data import (
         CsvLayout as CsvLayout,

@@ -8,15 +8,7 @@ from pydantic import Field, model_validator
 from identification.hammer.hammer_test import hammer_test
 from identification.hammer.result import HammerTest
 from identification.mapping.base import MeasurementMapping, NotNegative, Path, Positive, check_names, entries_at, in_si
-from identification.mapping.sampling import (
-    SignalMapping,
-    TimeUnit,
-    common_rate_hz,
-    instants_at,
-    rate_of_file_hz,
-    seconds_of_time,
-    stored_records,
-)
+from identification.mapping.sampling import SignalMapping, TimeUnit, one_rate_hz, stored_records
 
 
 class HammerChannel(SignalMapping):
@@ -81,13 +73,11 @@ def map_hammer_test(data: Any, mapping: HammerTestMapping) -> HammerTest:
         for number, entry in enumerate(entries)
         for record in stored_records(entry, mapping.channels, f"records[{number}], " if mapping.records else "")
     ]
-    rate = mapping.sample_rate_hz
-    if rate is None and mapping.time is not None:
-        rate = instants_at(entries[0], mapping.time, seconds_of_time(data, mapping.time_unit)).rate_hz
+    rate = one_rate_hz(data, entries[0], mapping)
     return hammer_test(
         records,
         channels,
-        common_rate_hz({"file": rate_of_file_hz(data)}) if rate is None else rate,
+        rate,
         record_s=mapping.record_s,
         pretrigger_s=mapping.pretrigger_s,
         trigger_n=mapping.trigger_n,

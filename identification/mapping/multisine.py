@@ -6,15 +6,7 @@ from pydantic import Field
 
 from identification.errors import IdentificationError
 from identification.mapping.base import MeasurementMapping, Path, Positive, entries_at, in_si
-from identification.mapping.sampling import (
-    SignalMapping,
-    TimeUnit,
-    common_rate_hz,
-    instants_at,
-    rate_of_file_hz,
-    seconds_of_time,
-    stored_records,
-)
+from identification.mapping.sampling import SignalMapping, TimeUnit, one_rate_hz, stored_records
 from identification.multisine.design import MultisineDesign
 from identification.multisine.spectra import PeriodicSpectra, periodic_spectra
 
@@ -56,17 +48,7 @@ def map_multisine(data: Any, mapping: MultisineMapping) -> PeriodicSpectra:
     disagree, sampling is uneven, lengths differ, values are NaN, or there is less than one whole period.
     """
     entries = entries_at(data, mapping.realisations, "realisations")
-    rate = common_rate_hz(
-        {
-            "sample_rate_hz": mapping.sample_rate_hz,
-            "time": None
-            if mapping.time is None
-            else instants_at(
-                entries[0], mapping.time, seconds_of_time(data, mapping.time_unit), mapping.sample_rate_hz
-            ).rate_hz,
-            "file": rate_of_file_hz(data),
-        }
-    )
+    rate = one_rate_hz(data, entries[0], mapping)
     design = MultisineDesign(rate, mapping.period_samples, mapping.lowest_hz, mapping.highest_hz, mapping.grid)
     channels, factors = in_si(mapping.channels)
     records = []

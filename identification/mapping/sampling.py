@@ -1,7 +1,7 @@
 """Sample rate of data that a mapping describes."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from vibrolock.quantities import seconds_in
 
 _SAME = 1e-6
 """Largest relative difference of sample rates that count as one."""
+WHOLE = 0.05
+"""Largest part of a sample by which the beginnings of two channels may miss the common grid."""
 TIME_UNITS = ("s", "ms", "us", "ns", "min", "h")
 """Usual units of instants; other spellings are understood as well."""
 
@@ -35,6 +37,26 @@ class SignalMapping(ChannelMapping):
 
     value: Path
     """Path of the samples; columns of a matrix are records."""
+
+
+class SampledMapping(Protocol):
+    """A mapping of channels that were sampled together."""
+
+    @property
+    def sample_rate_hz(self) -> float | None:
+        """Samples per second that it says."""
+
+    @property
+    def time(self) -> str | None:
+        """Path of the instants."""
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of the instants."""
+
+    @property
+    def channels(self) -> Sequence[SignalMapping]:
+        """The channels."""
 
 
 def stored_records(entry: Any, channels: Sequence[SignalMapping], where: str) -> list[NDArray[np.float64]]:
@@ -71,6 +93,64 @@ def seconds_of_time(data: Any, time_unit: str) -> float:
     if found is None:
         raise IdentificationError(field="time_unit", value=unit, allowed=TIME_UNITS)
     return found
+
+
+def rates_of_file(data: Any, paths: Sequence[str], of: str = "file") -> dict[str, float | None]:
+    """Return the sample rates that a file tells of all channels and of those at the paths, by where they are from."""
+    told: dict[str, float | None] = {of: rate_of_file_hz(data)}
+    rates = data.get("__rates_hz__") if isinstance(data, Mapping) else None
+    if isinstance(rates, Mapping):
+        told |= {f"{of} ({path})": rates[path] for path in paths if isinstance(rates.get(path), float)}
+    return told
+
+
+def start_of_file_s(data: Any, path: str) -> float:
+    """Return the instant at which the channel at a path begins by the file, s; 0 if it tells none."""
+    starts = data.get("__starts_s__") if isinstance(data, Mapping) else None
+    start = starts.get(path) if isinstance(starts, Mapping) else None
+    return start if isinstance(start, float) else 0.0
+
+
+def _check_starts(data: Any, channels: Sequence[SignalMapping], rate_hz: float) -> None:
+    """Raise `IdentificationError` if channels begin at different instants by the file, for mappings that line up none."""
+    starts = [start_of_file_s(data, channel.value) for channel in channels]
+    late = (np.array(starts) - min(starts)) * rate_hz
+    if late.max() > WHOLE:
+        at = int(np.argmax(late))
+        reason = f"begins {late[at]:.2f} samples after another"
+        hint = '`kind = "time-data"` lines channels up; or say `against_file = true` if the start times are wrong'
+        raise IdentificationError(reason, field=f"channels.{channels[at].name}", hint=hint)
+
+
+def one_rate_hz(data: Any, entry: Any, mapping: SampledMapping) -> float:
+    """Return the sample rate of all channels, on which file and mapping agree; ``entry`` is the structure with the instants.
+
+    Raises `IdentificationError` if they disagree, say none, or begin channels at different instants.
+    """
+    time, wanted = mapping.time, mapping.sample_rate_hz
+    seconds = seconds_of_time(data, mapping.time_unit)
+    told = {
+        "sample_rate_hz": wanted,
+        "time": None if time is None else instants_at(entry, time, seconds, wanted).rate_hz,
+        **rates_of_file(data, [channel.value for channel in mapping.channels]),
+    }
+    rate = common_rate_hz(told)
+    check_rates_beside(data, rate)
+    _check_starts(data, mapping.channels, rate)
+    return rate
+
+
+def check_rates_beside(data: Any, rate_hz: float) -> None:
+    """Raise `IdentificationError` if numbers beside the signals, named as sample rates, say another rate (Hz, or kHz)."""
+    beside = data.get("__rates_beside_hz__") if isinstance(data, Mapping) else None
+    for path, (told, rounding) in (beside or {}).items():
+        if all(abs(told * factor / rate_hz - 1.0) > rounding + _SAME for factor in (1.0, 1e3)):
+            raise IdentificationError(
+                f"'{path}' in the file says {told:g} Hz",
+                field="sample_rate_hz",
+                value=rate_hz,
+                hint="correct the mapping, or say `against_file = true` at the top if that number is another",
+            )
 
 
 def common_rate_hz(told: Mapping[str, float | None]) -> float:

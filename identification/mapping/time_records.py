@@ -11,14 +11,20 @@ from identification.experiments.periodicity import check_periods, period_remark
 from identification.experiments.time_experiments import resampled_periods
 from identification.experiments.time_records import TimeRecord, TimeRecords
 from identification.mapping.base import entries_at, in_si, notes_of, value_at
-from identification.mapping.sampling import common_rate_hz, instants_at, rate_of_file_hz, seconds_of_time
+from identification.mapping.sampling import (
+    WHOLE,
+    check_rates_beside,
+    common_rate_hz,
+    instants_at,
+    rates_of_file,
+    seconds_of_time,
+    start_of_file_s,
+)
 from identification.mapping.series import common_length, series
 from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
 from identification.signals.decimation import EDGE_SAMPLES, decimated
 from vibrolock.arrays import Float
 
-_WHOLE = 0.05
-"""Largest part of a sample by which the beginnings of two channels may miss the common grid."""
 _ONE_LEVEL = 1.15
 """Largest ratio of the force's RMS of a record to the next smaller one of the same level: realisations scatter by less."""
 
@@ -53,11 +59,13 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         where = f"{mapping.records}[{number}], " if mapping.records else ""
         raw += _raw_records({name: some[number] for name, some in entries.items()}, every, mapping, where)
     rate = raw[0].rate_hz
-    if any(abs(one.rate_hz / rate - 1.0) > 1e-6 for one in raw):
+    if any(abs(record.rate_hz / rate - 1.0) > 1e-6 for record in raw):
         reason = f"records have rates from {rate:g} Hz on"
         raise IdentificationError(reason, field="sample_rate_hz", hint="wanted is one")
+    for one in every.values():
+        check_rates_beside(one, rate)
     cut, notes = _cut(raw, mapping, rate)
-    if rounded_s := max(one.rounded_s for one in raw):
+    if rounded_s := max(record.rounded_s for record in raw):
         notes = (f"the instants are rounded by up to {rounded_s:.2g} s; {rate:.10g} Hz was taken", *notes)
     channels, _ = in_si(mapping.channels)
     forces = [row for row, channel in enumerate(channels) if channel.role == "force"]
@@ -146,21 +154,13 @@ def _sampling(
     entry: Any, file: Any, mapping: TimeDataMapping, channel: SampledChannel
 ) -> tuple[dict[str, float | None], float, float]:
     """Return the sample rates told of a channel, by where they are from, its first instant, and the rounding of instants, s."""
-    told: dict[str, float | None] = {}
-    start = rounded_s = 0.0
-    of_file = channel.file or "file"
-    if isinstance(file, Mapping):
-        told[of_file] = rate_of_file_hz(file)
-        rates, starts = file.get("__rates_hz__"), file.get("__starts_s__")
-        if isinstance(rates, Mapping) and isinstance(rate := rates.get(channel.value), float):
-            told[f"{of_file} ({channel.value})"] = rate
-        if isinstance(starts, Mapping) and isinstance(begin := starts.get(channel.value), float):
-            start = begin
+    told = rates_of_file(file, [channel.value], channel.file or "file")
+    start, rounded_s = start_of_file_s(file, channel.value), 0.0
     if mapping.time is not None and _holds(entry, mapping.time, alone=not channel.file):
         wanted = next((rate for rate in (mapping.sample_rate_hz, *told.values()) if rate is not None), None)
         found = instants_at(entry, mapping.time, seconds_of_time(file, mapping.time_unit), wanted)
-        told[f"time{' of ' if channel.file else ''}{channel.file}"], start = found.rate_hz, found.start_s
-        rounded_s = found.rounded_s
+        told[f"time{' of ' if channel.file else ''}{channel.file}"] = found.rate_hz
+        start, rounded_s = start + found.start_s, found.rounded_s
     return told, start, rounded_s
 
 
@@ -179,7 +179,7 @@ def _skipped(channels: Sequence[SampledChannel], starts: Sequence[float], rate_h
     """Return how many samples of each channel are left out at the beginning, so that all begin at one instant."""
     late = (max(starts) - np.array(starts)) * rate_hz
     for channel, samples in zip(channels, late, strict=True):
-        if abs(samples - round(samples)) > _WHOLE:
+        if abs(samples - round(samples)) > WHOLE:
             reason = f"begins {samples:.2f} samples before another"
             hint = "resample it, or say `against_file = true` at the top if the start times are wrong"
             raise IdentificationError(reason, field=f"channels.{channel.name}", allowed="whole samples", hint=hint)

@@ -7,44 +7,26 @@ of that channel, whose numbers are then taken as stored; at the top for rates, s
 say, the mapping says.
 """
 
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.file_data import ChannelFacts, FileData, Value
+from rig.exchange.clocks import other_clocks, rates_beside
+from rig.exchange.file_data import ChannelFacts, FileData, Value, unit_in_name
+from rig.exchange.spellings import time_unit_in
+from rig.exchange.uses import Use, instants_of, uses_of
 from vibrolock.quantities import quantity, says_a_unit, seconds_in
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
-
-@dataclass(frozen=True)
-class Use:
-    """A value of a file that a mapping takes, and the unit that it says."""
-
-    where: str
-    """Key of the mapping, for messages."""
-    path: str
-    unit: str
-    """Unit that the mapping says; empty if it says none."""
-    file: str = ""
-    """Name of the further file that holds it; empty for the one that is imported."""
-    rescaled: bool = False
-    """Whether the mapping makes another quantity of it."""
-    stored: bool = False
-    """Whether the mapping holds against what the file says of it."""
-    amplitude: bool = False
-    """Whether it is an amplitude, which may be in decibels of its unit."""
-    or_unit: str = ""
-    """Another unit that says the same: that of the output of a frequency response."""
+    from identification.mapping import MeasurementMapping
 
 
 def for_mapping(
-    data: FileData, mapping: "BaseModel", files: Mapping[str, FileData] | None = None
+    data: FileData, mapping: "MeasurementMapping", files: Mapping[str, FileData] | None = None
 ) -> tuple[dict[str, object], dict[str, dict[str, object]]]:
     """Return the values of a file, and of further ones by name, as `identification` maps them.
 
@@ -52,14 +34,13 @@ def for_mapping(
     `ImportFailed` where the mapping says otherwise than the file, or the file says what cannot be followed.
     """
     every = {"": data, **(files or {})}
-    uses = list(_uses(mapping))
+    uses = list(uses_of(mapping))
     for use in uses:
         if not use.stored:
             _check(use, every[use.file])
-    against = bool(getattr(mapping, "against_file", False))
-    later = {} if against else _later_s(every)
+    later = {} if mapping.against_file else _later_s(every)
     found = {
-        name: _with_sampling(one, [use for use in uses if use.file == name], mapping, later.get(name, 0.0), against)
+        name: _with_sampling(one, [use for use in uses if use.file == name], mapping, later.get(name, 0.0))
         for name, one in every.items()
     }
     return found.pop(""), found
@@ -98,29 +79,66 @@ def _applied(value: Value, facts: ChannelFacts) -> Value:
     return np.asarray((scaled + (facts.offset or 0.0)) * (-1.0 if facts.reversed else 1.0))
 
 
-def _with_sampling(
-    data: FileData, uses: list[Use], mapping: "BaseModel", later_s: float, against: bool
-) -> dict[str, object]:
+def _with_sampling(data: FileData, uses: list[Use], mapping: "MeasurementMapping", later_s: float) -> dict[str, object]:
     stored = {use.path for use in uses if use.stored}
     out: dict[str, object] = dict(meant(data, stored))
     if any(channel.in_si for channel in data.channels.values()):
         out["units"] = {name: channel.unit for name, channel in data.channels.items()}
     if data.notes:
         out["__notes__"] = data.notes
-    if units := {use.path: data.unit(use.path) for use in uses if not use.stored and data.unit(use.path)}:
+    if units := {use.path: unit for use in uses if not use.stored and (unit := _unit(use, data))}:
         out["__units__"] = units
-    if against:
+    if mapping.against_file:
         out.pop("sample_rate_hz", None)
         return out
     if data.sample_rate_hz is not None:
         out["sample_rate_hz"] = data.sample_rate_hz
-    facts = {use.path: data.facts(use.path) for use in uses if not use.stored}
+    time, time_unit, within = instants_of(mapping)
+    facts = {use.path: facts for use in uses if not use.stored for facts in _facts(use, data)[:1]}
     rates = {path: one.sample_rate_hz for path, one in facts.items() if one.sample_rate_hz is not None}
     starts = {path: (one.start_s or 0.0) + later_s for path, one in facts.items() if later_s or one.start_s is not None}
-    time = getattr(mapping, "time", None)
-    unit = data.unit(time) if isinstance(time, str) else ""
-    told = {"__rates_hz__": rates, "__starts_s__": starts, "__time_unit__": unit}
+    unit = _time_unit(data, _full(within, time)) if time else ""
+    of_clocks = other_clocks(data, [use.path for use in uses], time, seconds_in(time_unit or unit) or 1.0)
+    for path, clock in of_clocks.items():
+        rates[path], starts[path] = clock.rate_hz, starts.get(path, 0.0) + clock.start_s
+    beside = rates_beside(data, [_full(use.within, use.path) for use in uses])
+    told = {"__rates_hz__": rates, "__starts_s__": starts, "__time_unit__": unit, "__rates_beside_hz__": beside}
     return out | {name: value for name, value in told.items() if value}
+
+
+def _full(within: str, path: str) -> str:
+    return f"{within}[0].{path}" if within else path
+
+
+def _facts(use: Use, data: FileData) -> list[ChannelFacts]:
+    """Return what the file says of a value: of that in each structure, where a mapping takes it from a list of them."""
+    if not use.within:
+        return [data.facts(use.path)]
+    entry = re.compile(rf"{re.escape(use.within)}(\[\d+\])?\.{re.escape(use.path)}")
+    return [facts for name, facts in data.channels.items() if entry.fullmatch(name)] or [data.facts(use.path)]
+
+
+def _unit(use: Use, data: FileData) -> str:
+    """Return the unit that the file gives for a value that a mapping takes; raise `ImportFailed` if it gives several."""
+    facts = _facts(use, data)
+    units = [*dict.fromkeys(unit for one in facts for unit in ([one.unit] if one.unit else _columns(use, one)))]
+    if len(units) > 1:
+        raise ImportFailed(
+            f"'{use.path}' has several units ({', '.join(units)})",
+            field=use.where.removesuffix(".unit"),
+            hint="name the dimension `channel` in `axes` and give `index`, or `against_file = true` takes it as stored",
+        )
+    return units[0] if units else _time_unit(data, use.path) if use.where == "time" else unit_in_name(use.path)
+
+
+def _columns(use: Use, facts: ChannelFacts) -> list[str]:
+    if 0 < use.column <= len(facts.columns):
+        return [facts.columns[use.column - 1]]
+    return [*facts.columns]
+
+
+def _time_unit(data: FileData, path: str) -> str:
+    return data.unit(path) or time_unit_in(path)
 
 
 def _later_s(files: Mapping[str, FileData]) -> dict[str, float]:
@@ -131,14 +149,14 @@ def _later_s(files: Mapping[str, FileData]) -> dict[str, float]:
 
 def _check(use: Use, data: FileData) -> None:
     """Raise `ImportFailed` if a mapping takes what cannot be followed, or says another unit than the file."""
-    facts = data.facts(use.path)
-    if facts.unread:
-        raise ImportFailed(
-            f"'{use.path}' {facts.unread}",
-            field=use.where.removesuffix(".unit"),
-            hint="with `against_file = true` it is taken as stored",
-        )
-    given = data.unit(use.path)
+    for facts in _facts(use, data):
+        if facts.unread:
+            raise ImportFailed(
+                f"'{use.path}' {facts.unread}",
+                field=use.where.removesuffix(".unit"),
+                hint="with `against_file = true` it is taken as stored",
+            )
+    given = _unit(use, data)
     if not says_a_unit(given) or use.rescaled or (use.amplitude and given.strip().lower().startswith("db")):
         return
     if use.where == "time":
@@ -169,58 +187,3 @@ def _check_time(use: Use, given: str) -> None:
             value=use.unit or "s",
             hint="write that, or `against_file = true` with the right `time_unit` if the file is wrong",
         )
-
-
-def _uses(mapping: "BaseModel") -> Iterator[Use]:
-    """Yield the values that a mapping takes."""
-    import identification as i
-
-    against = bool(getattr(mapping, "against_file", False))
-    if isinstance(time := getattr(mapping, "time", None), str):
-        yield Use("time", time, getattr(mapping, "time_unit", ""), stored=against)
-    if isinstance(frequency := getattr(mapping, "frequency", None), str):
-        yield Use("frequency_unit", frequency, getattr(mapping, "frequency_unit", "Hz") or "", stored=against)
-    for channel in getattr(mapping, "channels", ()):
-        yield from _of_channel(channel)
-    if isinstance(mapping, i.ResponseMatrixMapping):
-        yield from _of_responses(mapping)
-    if isinstance(mapping, i.FrequencyResponseMapping):
-        units, phase = mapping.units, mapping.phase
-        for group in mapping.sets:
-            for key, unit in (("frequency", units.frequency), ("force", units.force), ("response", units.response)):
-                yield Use(f"units.{key}", getattr(group, key), unit, stored=against)
-            if group.phase is not None:
-                yield Use("phase.unit", group.phase, phase.unit if phase else "", stored=against)
-
-
-def _of_channel(channel: Any) -> Iterator[Use]:
-    where, value = f"channels.{channel.name}", channel.value
-    unit, stored = channel.unit, channel.against_file
-    about = {"file": getattr(channel, "file", ""), "stored": stored}
-    rescaled = getattr(channel, "scale", 1.0) != 1.0
-    if isinstance(value, str):
-        yield Use(f"{where}.unit", value, unit, rescaled=rescaled, **about)
-        return
-    yield from _of_parts(Use(f"{where}.unit", "", unit, rescaled=rescaled, **about), value)
-
-
-def _of_parts(use: Use, value: Any) -> Iterator[Use]:
-    """Yield the parts of complex numbers, each as ``use`` would be."""
-    for part in ("real", "imaginary", "amplitude"):
-        if (path := getattr(value, part)) is not None:
-            yield replace(use, path=path, amplitude=part == "amplitude")
-    if value.phase is not None:
-        where = f"{use.where.removesuffix('.unit')}.phase_unit"
-        yield replace(use, path=value.phase, where=where, unit=value.phase_unit or "", or_unit="", rescaled=False)
-
-
-def _of_responses(mapping: Any) -> Iterator[Use]:
-    """Yield the frequency responses of a mapping, each in the unit of its output over that of its input."""
-    units = {channel.name: channel.unit for channel in (*mapping.outputs, *mapping.inputs)}
-    for number, one in enumerate(mapping.paths):
-        above, below = units.get(one.output, ""), units.get(one.input, "")
-        use = Use(f"paths[{number}].value", "", f"({above})/({below})", or_unit=above)
-        if isinstance(one.value, str):
-            yield replace(use, path=one.value)
-        else:
-            yield from _of_parts(use, one.value)

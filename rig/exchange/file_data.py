@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ _IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]$")
 _ANYWHERE = re.compile(r"[\[({<]([^\[\](){}<>]*[^\[\](){}<>\d][^\[\](){}<>]*)[\])}>]")
 _BEHIND = re.compile(r".*\S(?:\s+/\s*|,\s*|:\s+|\s+in\s+)(\S[^,]*)$")  # Force / kN; Force, kN; Force in kN
 _LAST_WORD = re.compile(r".*[^\W_](?:[_ /:]|\s)(ms|us|µs|μs|ns|msec|usec|kN|mN|lbf|mV|mm|um|µm|μm)$")  # force_kN
+_ENTRY = re.compile(r"(.+)\[(\d+)\]")
 _IN_NAMES = (*SIGNALS, "s")
 _READ = 200  # letters of a name in which a unit is sought; chosen: the patterns' time grows with their square
 
@@ -45,6 +46,8 @@ class ChannelFacts:
     """Name as the file has it; empty where it is the name of the value."""
     unit: str = ""
     """Unit; empty if the file gives none."""
+    columns: Sequence[str] = ()
+    """Units along the dimension of that length, where the value holds several channels; empty if the file gives none."""
     in_si: bool = False
     """Whether the reader has converted the values to SI, and ``unit`` is that of the converted ones."""
     scale: float | None = None
@@ -63,6 +66,10 @@ class ChannelFacts:
     """Direction at the node, such as ``+Z``; empty if the file gives none."""
     unread: str = ""
     """What the file says of this channel that cannot be followed, in words; a mapping that takes the channel is refused."""
+
+    def __post_init__(self) -> None:
+        """Keep the units of columns as a tuple, also where they come as a list."""
+        object.__setattr__(self, "columns", tuple(self.columns))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,15 +90,22 @@ class FileData:
     """Instant from which the start times of the channels count, s since 1970 (UTC); None if the file gives none."""
 
     def facts(self, path: str) -> ChannelFacts:
-        """Return what the file says of the channel at a path, which may be written with dots for the groups of the file."""
+        """Return what the file says of the channel at a path, which may be written with dots for the groups of the file.
+
+        An entry of a value, ``name[2]``, has what the file says of the whole.
+        """
         if path in self.channels:
             return self.channels[path]
         whole = next((name for name in self.channels if "/" in name and name.replace("/", ".") == path), "")
-        return self.channels.get(whole) or ChannelFacts()
+        if whole or not (entry := _ENTRY.fullmatch(path)):
+            return self.channels.get(whole) or ChannelFacts()
+        found, at = self.facts(entry[1]), int(entry[2])
+        return replace(found, unit=found.columns[at], columns=()) if at < len(found.columns) else found
 
     def unit(self, path: str) -> str:
         """Return the unit that the file gives for a value, also in brackets at the end of its name; empty if it gives none."""
-        return self.facts(path).unit or unit_in_name(path)
+        facts = self.facts(path)
+        return facts.unit or (facts.columns[0] if len({*facts.columns}) == 1 else "") or unit_in_name(path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,26 +117,20 @@ class StoredObject:
     attributes: dict[str, object]
 
 
-def from_variables(values: dict[str, Value], units: Mapping[str, Value] | None = None) -> FileData:
+def from_variables(values: dict[str, Value], facts: Mapping[str, ChannelFacts] | None = None) -> FileData:
     """Return the content of a file of named variables.
 
-    ``units`` are those that the file gives by the names of its values. Variables called ``units`` (a structure of texts) and
+    ``facts`` are what the file says of its values, by name. Variables called ``units`` (a structure of texts) and
     ``sample_rate_hz`` (a number) count as what the file says of all others.
     """
-    stored = values.get("units")
-    given = {**(stored if isinstance(stored, dict) else {}), **(units or {})}
-    rate = values.get("sample_rate_hz")
+    rate, stored = values.get("sample_rate_hz"), values.get("units")
+    units = stored if isinstance(stored, dict) else {}
+    given = {name: ChannelFacts(unit=unit) for name, unit in units.items() if isinstance(unit, str) and unit}
     return FileData(
         values=values,
-        channels={name: ChannelFacts(unit=unit) for name, unit in given.items() if isinstance(unit, str) and unit},
+        channels={**given, **(facts or {})},
         sample_rate_hz=rate if isinstance(rate, float) else None,
     )
-
-
-def units_beside(values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the units of values by name: texts called ``NAME_unit`` or ``NAME_units`` beside them."""
-    keys = {name: next((key for key in (f"{name}_unit", f"{name}_units") if key in values), "") for name in values}
-    return {name: values[key] for name, key in keys.items() if key and isinstance(values[key], str)}
 
 
 def unit_in_name(name: str) -> str:

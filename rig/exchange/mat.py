@@ -11,8 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.exchange.beside import facts_beside, merged
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.exchange.file_data import ChannelFacts, FileData, StoredObject, Value, from_variables, units_beside
+from rig.exchange.file_data import ChannelFacts, FileData, StoredObject, Value, from_variables
+from rig.exchange.spellings import factor_remark
 from rig.text.contents import Contents
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
@@ -98,12 +100,12 @@ def signals_described(value: Value, path: str = "", depth: int = 0) -> Iterator[
     if isinstance(value, dict):
         name, unit = _text_at(value, _NAMES_OF), _text_at(value, _UNITS_OF)
         data = next((key for key in value if key.lower() in _DATA and isinstance(value[key], np.ndarray)), "")
-        if data and path and (name or unit):
-            yield f"{path}.{data}", ChannelFacts(name=name, unit=unit)
-        units = value.get("units")
-        beside = {**(units if isinstance(units, dict) else {}), **units_beside(value)}
         above = f"{path}." if path else ""
-        yield from ((f"{above}{key}", ChannelFacts(unit=text)) for key, text in beside.items() if isinstance(text, str))
+        beside = merged(from_variables(value).channels, facts_beside(value))
+        if data and path and (name or unit):
+            remarks = "; ".join(filter(None, (factor_remark(*pair, "beside it") for pair in value.items())))
+            beside = merged(beside, {data: ChannelFacts(name=name, unit=unit, unread=remarks)})
+        yield from ((f"{above}{key}", facts) for key, facts in beside.items())
         for key, item in value.items():
             yield from signals_described(item, f"{path}.{key}" if path else key, depth + 1)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1):

@@ -13,9 +13,8 @@ from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.sources import format_of, read_data
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     import identification as i
+    from identification.mapping import MeasurementMapping
     from rig.results.time_data.series import TimeData
 
     Measurement = (
@@ -106,7 +105,7 @@ def import_sep005(series: Sequence[Mapping[str, object]], mapping: str | Path) -
         raise ImportFailed.of(error, where=f"the series do not fit {mapping}") from None
 
 
-def _kinds() -> "dict[str, tuple[type[BaseModel], Callable[..., Measurement]]]":
+def _kinds() -> "dict[str, tuple[type[MeasurementMapping], Callable[..., Measurement]]]":
     """Return the mappings by kind, each with the function that applies it to values."""
     import identification as i
 
@@ -122,7 +121,7 @@ def _kinds() -> "dict[str, tuple[type[BaseModel], Callable[..., Measurement]]]":
     }
 
 
-def read_mapping(path: str | Path) -> "BaseModel":
+def read_mapping(path: str | Path) -> "MeasurementMapping":
     """Read a mapping from TOML; raise `ConfigurationError` that names each wrong key and its value."""
     table, kinds = read_toml(Path(path)), _kinds()
     kind = table.get("kind", _DEFAULT_KIND)
@@ -146,7 +145,7 @@ def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> "Measur
     return _mapped(data, mapping, files)
 
 
-def _mapped(data: FileData, mapping: "BaseModel", files: Mapping[str, FileData]) -> "Measurement":
+def _mapped(data: FileData, mapping: "MeasurementMapping", files: Mapping[str, FileData]) -> "Measurement":
     from identification import TimeDataMapping
 
     values, further = for_mapping(data, mapping, files)

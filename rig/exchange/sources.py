@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import ConfigurationError
+from rig.exchange.beside import facts_beside, merged
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.exchange.file_data import FileData, from_variables, in_full, units_beside
+from rig.exchange.file_data import FileData, from_variables, in_full
 from rig.exchange.foreign.attributes import facts_of_attributes
 from rig.exchange.uff.reading import read_uff
 from rig.exchange.uff.time_data import time_data_in
@@ -62,7 +63,7 @@ def read_data(path: Path, format_: str, *, units: str = "", layout: "CsvLayout |
     if format_ != "hdf5":
         return data
     full = {**dict(in_full(data.values)), **data.values}  # values within groups also by full names, units by attributes
-    found = from_variables(full, units_beside(full))
     netcdf = path.suffix.lower() in (".nc", ".nc4")
-    channels = {**found.channels, **facts_of_attributes(full, netcdf=netcdf), **data.channels}
+    found = from_variables(full)
+    channels = merged(found.channels, facts_beside(full), facts_of_attributes(full, netcdf=netcdf), data.channels)
     return replace(found, channels=channels, sample_rate_hz=data.sample_rate_hz)

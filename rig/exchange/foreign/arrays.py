@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.exchange.beside import facts_beside
 from rig.exchange.child_values import TooMuchData, most_bytes
-from rig.exchange.file_data import FileData, Value, from_variables, units_beside
-from rig.exchange.tables.heading import is_units
+from rig.exchange.file_data import ChannelFacts, FileData, Value, from_variables, in_full
+from rig.exchange.tables.heading import are_units_above, is_units
 from vibrolock.arrays import Float
 
 _MOST_HEAD = 100  # rows that may stand above the names; chosen
@@ -30,7 +31,8 @@ def read_npz(path: Path) -> FileData:
             if entry.filename.endswith(".npy"):
                 stored = io.BytesIO(archive.read(entry))
                 values[entry.filename.removesuffix(".npy")] = _plain(np.load(stored, allow_pickle=False))
-    return from_variables(values, units_beside(values))
+    full = {**dict(in_full(values)), **values}
+    return from_variables(values, facts_beside(full))
 
 
 def _plain(array: NDArray[Any]) -> Value:
@@ -47,8 +49,8 @@ def _plain(array: NDArray[Any]) -> Value:
 def read_workbook(path: Path) -> FileData:
     """Return the columns of the sheets by name: of the only sheet with numbers, or of all by ``sheet/name``.
 
-    A row of names, one of units, which may be missing, and rows of numbers make a sheet. Raises ValueError, with the cell, for
-    what is no number, ImportError without openpyxl.
+    A row of names, one of units below or above it, which may be missing, and rows of numbers make a sheet. Raises
+    ValueError, with the cell, for what is no number, ImportError without openpyxl.
     """
     from openpyxl import load_workbook
 
@@ -66,12 +68,12 @@ def read_workbook(path: Path) -> FileData:
         raise ValueError("it holds no sheet with names above rows of numbers")
     several = len(found) > 1
     values: dict[str, Value] = {}
-    units: dict[str, Value] = {}
+    facts: dict[str, ChannelFacts] = {}
     for title, (columns, told) in found.items():
         before = f"{title}/" if several else ""
         values |= {f"{before}{name}": column for name, column in columns.items()}
-        units |= {f"{before}{name}": unit for name, unit in told.items()}
-    return from_variables(values, units)
+        facts |= {f"{before}{name}": ChannelFacts(unit=unit) for name, unit in told.items()}
+    return from_variables(values, facts)
 
 
 Row = Sequence[object]
@@ -91,7 +93,9 @@ def _sheet(title: str, rows: Iterator[Row]) -> tuple[dict[str, Float], dict[str,
     if first is None or not heads:
         return {}, {}
     units: list[str] = []
-    if len(heads) > 1 and is_units(_texts(heads[-1])) and len(_filled(heads[-2])) >= len(_filled(heads[-1])):
+    if len(heads) > 1 and are_units_above(*map(_texts, heads[-2:])):
+        units = _texts(heads.pop(-2))
+    elif len(heads) > 1 and is_units(_texts(heads[-1])) and len(_filled(heads[-2])) >= len(_filled(heads[-1])):
         units = _texts(heads.pop())
     names = _texts(heads[-1])
     places = [at for at, name in enumerate(names) if name]

@@ -5,25 +5,20 @@ https://cfconventions.org/cf-conventions/cf-conventions.html. A file may use the
 other names that seem to be factors are facts that cannot be followed: files do not say whether they are in the numbers.
 """
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.exchange.beside import texts_in, units_in, with_units
 from rig.exchange.file_data import ChannelFacts, Value
+from rig.exchange.spellings import START_KEYS, UNIT_KEYS, factor_remark, number_in, plain, rate_named
 from vibrolock.quantities import says_a_unit
 
-_UNITS = ("units", "unit", "unitname", "unitstring", "unitstr", "engineeringunits", "engineeringunit", "eu")
-_RATES = ("samplerate", "sampleratehz", "samplingrate", "samplingfrequency", "fs")
-_STEPS = ("dt", "wfincrement", "samplinginterval", "sampleinterval")
-_STARTS = ("starttime", "t0", "startoffset", "wfstartoffset", "wfstarttime", "starttimestamp")
-_FACTORS = (
-    *("gain", "scale", "scaling", "scalingfactor", "conversion", "conversionfactor", "multiplier", "factor", "slope"),
-    *("calibration", "calibrationfactor", "sensitivity", "polarity"),
-)
-_OFFSETS = ("offset", "intercept")
+_FIELD = re.compile(r"FIELD_(\d+)_UNITS?")
 _MISSING = ("_FillValue", "missing_value")
 _NOT_WRITTEN = {
     "i2": -32767,
@@ -50,56 +45,64 @@ def facts_of_attributes(values: Mapping[str, Value], *, netcdf: bool = False) ->
     earliest = min(starts.values(), default=0.0)
     found: dict[str, ChannelFacts] = {}
     for name, of in every.items():
-        value, units = values.get(name), _units(of)
-        if isinstance(value, dict) and len(units) == len(value):  # a table, with a unit for each column
-            found |= {f"{name}/{column}": ChannelFacts(unit=unit) for column, unit in zip(value, units, strict=True)}
+        if columns := [key for key in _inside(values, name) if "@" not in key]:
+            units = dict(zip(columns, _units(of), strict=False)) if len(_units(of)) == len(columns) > 1 else {}
+            units |= _units_of_fields(of, columns)
+            found |= {f"{name}/{column}": ChannelFacts(unit=unit) for column, unit in units.items()}
     for name, value in values.items():
         if isinstance(value, np.ndarray) and value.dtype.kind in "biuf" and "@" not in name:
             of = every.get(name, {})
-            units = [*dict.fromkeys(_units(of))]
-            several = [f"has several units ({', '.join(units)})"] if len(units) > 1 else []
-            facts = ChannelFacts(
-                unit=units[0] if len(units) == 1 else "",
-                scale=_number(of.get("scale_factor")),
-                offset=_number(of.get("add_offset")),
-                sample_rate_hz=_rate_hz(of),
-                start_s=starts[name] - earliest if name in starts else None,
-                unread="; ".join([*several, *_unread(value, of), *(_unwritten(value, of) if netcdf else [])]),
+            rates = (rate_named(key, told) for key, told in of.items())
+            facts = with_units(
+                ChannelFacts(
+                    scale=number_in(of.get("scale_factor")),
+                    offset=number_in(of.get("add_offset")),
+                    sample_rate_hz=next((rate for rate in rates if rate is not None), None),
+                    start_s=starts[name] - earliest if name in starts else None,
+                    unread="; ".join([*_unread(value, of), *(_unwritten(value, of) if netcdf else [])]),
+                ),
+                _units(of),
+                value,
             )
             found |= {} if facts == ChannelFacts() else {name: facts}
     return found
 
 
-def _plain(key: str) -> str:
-    return key.lower().replace("_", "").replace(" ", "")
+def _inside(values: Mapping[str, Value], name: str) -> Mapping[str, Value]:
+    """Return what a group or table holds; nothing for any other name."""
+    inside: Value = {**values}
+    for part in filter(None, name.split("/")):
+        inside = inside.get(part) if isinstance(inside, dict) else None
+    return inside if isinstance(inside, dict) and name else {}
 
 
 def _units(of: Mapping[str, Value]) -> list[str]:
     """Return the unit in the attributes of an array, or the units."""
-    told = {_plain(key): value for key, value in of.items()}
-    for key in _UNITS:
-        value = told.get(key)
-        texts = [value] if isinstance(value, str) else value if isinstance(value, list) else []
-        if units := [text for text in texts if isinstance(text, str) and (len(texts) > 1 or says_a_unit(text))]:
+    told = {plain(key): units_in(value) for key, value in of.items()}
+    for key in UNIT_KEYS:
+        if (units := told.get(key, [])) and (len(units) > 1 or says_a_unit(units[0])):
             return units
     return []
 
 
-def _rate_hz(of: Mapping[str, Value]) -> float | None:
-    for names, power in ((_RATES, 1), (_STEPS, -1)):
-        for key, value in of.items():
-            number = _number(value) if _plain(key) in names else None
-            if number is not None and 0.0 < number < np.inf:
-                return float(number**power)
-    return None
+def _units_of_fields(of: Mapping[str, Value], columns: Sequence[str]) -> dict[str, str]:
+    """Return the units of the columns of a table as PyTables writes them: ``FIELD_0_UNITS``."""
+    found: dict[str, str] = {}
+    for key, value in of.items():
+        field = _FIELD.fullmatch(key)
+        units = texts_in(value)
+        if field and len(units) == 1 and says_a_unit(units[0]) and int(field[1]) < len(columns):
+            name = of.get(f"FIELD_{field[1]}_NAME")
+            found[name if isinstance(name, str) and name in columns else columns[int(field[1])]] = units[0]
+    return found
 
 
 def _start_s(of: Mapping[str, Value]) -> float | None:
     """Return the instant of the first sample: s, or a date and time of ISO 8601, of UTC where it has no zone."""
     for key, value in of.items():
-        if _plain(key) not in _STARTS:
+        if plain(key) not in START_KEYS:
             continue
-        number = _number(value)
+        number = number_in(value)
         if number is None and isinstance(value, str):
             with suppress(ValueError):
                 instant = datetime.fromisoformat(value)
@@ -109,20 +112,13 @@ def _start_s(of: Mapping[str, Value]) -> float | None:
     return None
 
 
-def _number(value: Value) -> float | None:
-    array = np.asarray(value) if isinstance(value, np.ndarray | np.generic | int | float) else None
-    return float(array.reshape(-1)[0]) if array is not None and array.size == 1 and array.dtype.kind in "biuf" else None
-
-
 def _unread(values: NDArray[np.generic], of: Mapping[str, Value]) -> Iterator[str]:
     """Yield in words what cannot be followed."""
     for key, value in of.items():
-        number = _number(value)
-        if key in ("scale_factor", "add_offset") and number is None:
+        if key in ("scale_factor", "add_offset") and number_in(value) is None:
             yield f"has {key} {value!r}, which is no number"
-        neutral = 1.0 if _plain(key) in _FACTORS else 0.0 if _plain(key) in _OFFSETS else None
-        if number is not None and neutral is not None and number != neutral:
-            yield f"has the attribute {key} ({number:g}), and the file does not say whether it is in the numbers"
+        if remark := factor_remark(key, value, "the attribute"):
+            yield remark
     if str(of.get("_Unsigned", "")).lower() == "true" and values.dtype.kind == "i":
         yield "is marked _Unsigned, but stored with a sign"
     for key in _MISSING:
@@ -145,5 +141,5 @@ def _unwritten(values: NDArray[np.generic], of: Mapping[str, Value]) -> Iterator
 
 def _limits(of: Mapping[str, Value]) -> tuple[float, float]:
     pair = np.ravel(np.asarray(of.get("valid_range", ())))
-    low, high = (_number(of.get("valid_min")), _number(of.get("valid_max"))) if pair.size != 2 else map(float, pair)
+    low, high = (number_in(of.get("valid_min")), number_in(of.get("valid_max"))) if pair.size != 2 else map(float, pair)
     return -np.inf if low is None else low, np.inf if high is None else high

@@ -9,13 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.mapping import even_sampling
-from rig.exchange.file_data import ChannelFacts, FileData
+from rig.exchange.file_data import ChannelFacts, FileData, Value
+from rig.exchange.spellings import UNIT_KEYS, factor_remark, number_in, plain, rate_named
 from vibrolock.quantities import says_a_unit, seconds_in
 
 if TYPE_CHECKING:
@@ -29,10 +30,9 @@ _SCALES = (
     *("Polynomial", "Linear", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI"),
 )
 """Kinds of scales that npTDMS applies (version 1.13)."""
-_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
-"""Properties of TDMS that say the unit, the first that is there."""
 _TIME = (0, 1)  # types of a master channel that is time: none said, or time (ASAM MDF 4.1, block CN)
 _FROM_1904_S = 2_082_844_800  # from the origin of time stamps of TDMS, 1904, to 1970
+_ONE_RATE = 1e-4  # relative difference of rates as they are printed; chosen
 _FORMULA = 3  # type of a conversion by a formula (ASAM MDF 4.1, block CC)
 Found = dict[str, tuple[NDArray[np.generic], ChannelFacts]]
 """Values and facts of channels by name."""
@@ -83,24 +83,35 @@ def read_tdms(path: Path) -> FileData:
 
 
 def _facts_of_tdms(name: str, every: Sequence[Mapping[str, object]]) -> ChannelFacts:
-    """Return what the properties of a channel say, and those of its group and file of its scales."""
-    properties = every[0]
-    step, start = properties.get("wf_increment"), properties.get("wf_start_offset")
-    unit = next((properties[key] for key in _UNITS if properties.get(key)), "")
-    of_time = properties.get("wf_xunit_string")
+    """Return what the properties of a channel say, and those of its group and file: of rates, units and scales."""
+    properties = cast("Sequence[Mapping[str, Value]]", every)
+    start = properties[0].get("wf_start_offset")
+    unit = next((unit for key in UNIT_KEYS for one in properties[:2] if (unit := _text_at(one, key))), "")
+    of_time = next((one["wf_xunit_string"] for one in properties if one.get("wf_xunit_string")), "")
     seconds = seconds_in(of_time) if isinstance(of_time, str) and says_a_unit(of_time) else 1.0
-    known = isinstance(step, float) and step > 0.0 and seconds is not None
-    remarks = (
-        [] if seconds is not None or step is None else [f"has a waveform over {of_time}, which is no unit of time"]
-    )
+    step = next((step for one in properties if (step := number_in(one.get("wf_increment"))) and step > 0.0), None)
+    rates = {"wf_increment": 1.0 / (step * seconds)} if step and seconds else {}
+    for key, value in (pair for one in properties for pair in one.items() if pair[0] != "wf_increment"):
+        if (rate := rate_named(key, value)) is not None:
+            rates.setdefault(key, rate)
+    remarks = [f"has a waveform over {of_time!s}, which is no unit of time"] if step and seconds is None else []
+    if rates and max(rates.values()) / min(rates.values()) - 1.0 > _ONE_RATE:
+        remarks.append(f"has several rates ({', '.join(f'{key} {rate:g} Hz' for key, rate in rates.items())})")
     remarks += [f"is scaled by {kind}, which npTDMS does not know" for kind in _unknown_scales(every)]
+    remarks += [remark for key, value in properties[0].items() if (remark := factor_remark(key, value, "the property"))]
     return ChannelFacts(
         name=name,
-        unit=unit if isinstance(unit, str) else "",
-        sample_rate_hz=1.0 / (step * seconds) if isinstance(step, float) and known and seconds else None,
+        unit=unit,
+        sample_rate_hz=next(iter(rates.values()), None),
         start_s=start * (seconds or 1.0) if isinstance(start, float) else None,
         unread="; ".join(remarks),
     )
+
+
+def _text_at(properties: Mapping[str, Value], plain_key: str) -> str:
+    """Return the text of the property with a key, however it is spelled, if it says a unit."""
+    texts = (value for key, value in properties.items() if plain(key) == plain_key and isinstance(value, str))
+    return next(filter(says_a_unit, texts), "")
 
 
 def _unknown_scales(every: Sequence[Mapping[str, object]]) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Contents of a file of another program: arrays by path, single numbers, lists of structures."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -29,6 +29,9 @@ class Leaf:
     """Name of the file, if it is a further one."""
     called: str = ""
     """Name that the file gives in another place than the path; empty if it gives none."""
+
+    columns: Sequence[str] = ()
+    """Units of its columns, where it holds several channels."""
 
     @property
     def name(self) -> str:
@@ -81,8 +84,9 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
             single[path] = float(array)
         elif array.size:
             facts = data.channels.get(path)
+            columns = facts.columns if facts else ()
             called = records.rpartition(".")[2] if path == "." else facts.name if facts else ""
-            arrays.append(Leaf(path, array, data.unit(path), file, called))
+            arrays.append(Leaf(path, array, "" if len(columns) > 1 else data.unit(path), file, called, columns))
     others |= {name: one.unread for name, one in data.channels.items() if one.unread and name not in data.values}
     rate = _rate(data, [leaf.path for leaf in arrays])
     beside = _beside(top, records) if records else None

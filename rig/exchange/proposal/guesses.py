@@ -12,16 +12,12 @@ from numpy.typing import NDArray
 
 from identification import IdentificationError
 from identification.mapping import even_sampling, si_of
+from rig.exchange.spellings import is_time_name, rate_named
 from vibrolock.arrays import Float
 from vibrolock.quantities import says_a_unit, seconds_in
 
-_RATES = re.compile(
-    r"(f_?s|sr|sample_?rate(_?hz)?|sampling_?(rate|freq(uency)?)|rate(_hz)?|freq_?s(ample)?)$", re.IGNORECASE
-)
-_STEPS = re.compile(r"(dt|delta_?t|t_?s|sample_?time|wf_increment)$", re.IGNORECASE)
-_TIMES = re.compile(
-    r"(t|x_value|.*(time|times|zeit|temps|tiempo)([_ ]?(stamps?|axis|vector|s|sec|ms|us))?)$", re.IGNORECASE
-)
+_RATES = re.compile(r"(sr|rate(_hz)?)$", re.IGNORECASE)  # names that may be rates, beside those that are
+_STEPS = re.compile(r"t_?s$", re.IGNORECASE)
 _FORCES = re.compile(r"(f|u|in|input|load)\d*$|.*(force|kraft|hammer|excit|impuls)", re.IGNORECASE)
 _VOLTAGES = re.compile(r"(ref|dac)\d*$|.*(volt|generator|source|command)", re.IGNORECASE)
 _MOTIONS = re.compile(r"[xyadv]\d*$|out|resp|.*(acc|beschl|vel|geschw|ldv|disp|defl|posit)", re.IGNORECASE)
@@ -41,9 +37,13 @@ _MOST_TRIED = 200
 
 def rate_in(single: Mapping[str, float]) -> tuple[str, float] | None:
     """Return the path and the value (Hz) of a sample rate among single numbers, by their names; None if there is none."""
+    last = {path: re.split(r"[./@]", path)[-1] for path in single}
+    for path, value in single.items():
+        if (rate := rate_named(last[path], value)) is not None:
+            return path, rate
     for names, is_step in ((_RATES, False), (_STEPS, True)):
         for path, value in single.items():
-            if names.match(re.split(r"[./@]", path)[-1]) and 0.0 < value < np.inf:
+            if names.match(last[path]) and 0.0 < value < np.inf:
                 return path, 1.0 / value if is_step else value
     return None
 
@@ -68,7 +68,7 @@ def is_time(name: str, values: NDArray[np.generic], unit: str = "") -> bool:
 
 def is_named_time(name: str, unit: str = "") -> bool:
     """Return whether a name or a unit tells that an array holds instants."""
-    return seconds_in(unit) is not None or _TIMES.match(name) is not None
+    return seconds_in(unit) is not None or is_time_name(name)
 
 
 def role_of(name: str, unit: str) -> tuple[str, str]:

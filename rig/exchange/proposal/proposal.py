@@ -23,6 +23,7 @@ from rig.exchange.proposal.guesses import (
 )
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
+from rig.exchange.spellings import time_unit_in
 from rig.exchange.tables.guess import guessed_layout
 from vibrolock.quantities import seconds_in
 
@@ -72,8 +73,9 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
     if not lengths:
         raise ImportFailed(f"{path}: holds no array of real numbers with {_MIN_SAMPLES} samples or more")
     samples = max(set(lengths), key=lambda length: (lengths.count(length), length))  # the commonest, then the largest
-    times = [leaf for leaf in arrays if is_time(leaf.name, leaf.values, leaf.unit)]
-    signals = [leaf for leaf in arrays if samples in leaf.values.shape and leaf not in times]
+    instants = [leaf for leaf in arrays if is_time(leaf.name, leaf.values, leaf.unit)]
+    times = [replace(leaf, unit=leaf.unit or time_unit_in(leaf.path)) for leaf in instants]
+    signals = [leaf for leaf in arrays if samples in leaf.values.shape and leaf not in instants]
     if not signals:
         raise ImportFailed(f"{path}: holds no signals: arrays of {_MIN_SAMPLES} samples and more besides the time")
     channels = _channels(signals, samples)
@@ -102,6 +104,9 @@ def _channels(signals: Sequence[Leaf], samples: int) -> list[ProposedChannel]:
     of_reference = dimensions(reference.values, samples)
     if len(signals) == 1 and reference.values.ndim == 2:  # the columns of the only array of a file are channels
         of_reference = ("sample", "channel") if reference.values.shape.index(samples) == 0 else ("channel", "sample")
+    if len(reference.columns) > 1 and reference.values.ndim == 2:
+        first = reference.values.shape[0] == len(reference.columns)
+        of_reference = ("channel", "sample") if first else ("sample", "channel")
     known = dict(zip(of_reference, reference.values.shape, strict=True))
     found: list[ProposedChannel] = []
     for leaf in signals:
@@ -109,6 +114,8 @@ def _channels(signals: Sequence[Leaf], samples: int) -> list[ProposedChannel]:
         role, unit = role_of(leaf.name, leaf.unit)
         count = leaf.values.shape[axes.index("channel")] if "channel" in axes else 1
         for index in range(1, count + 1):
+            if len(leaf.columns) == count > 1:
+                role, unit = role_of(leaf.name, leaf.columns[index - 1])
             name = leaf.name if count == 1 else f"{leaf.name}{index}"
             found.append(ProposedChannel(leaf, name, role, unit, axes, index))
     names = [channel.name for channel in found]

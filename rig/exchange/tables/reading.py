@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.mapping import CsvLayout
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.file_data import FileData, Value, from_variables
+from rig.exchange.file_data import ChannelFacts, FileData, Value, from_variables
 from rig.exchange.tables.heading import Heading, heading_of
 from rig.exchange.tables.rows import Columns, RowFailed
 from rig.exchange.tables.text import blocks, encoding_of, table_lines
@@ -41,7 +41,8 @@ def read_table(path: Path, layout: CsvLayout | None = None) -> FileData:
     columns = heading.columns
     values: dict[str, Value] = {columns.names[at]: f"<texts such as {heading.first[at]!r}>" for at in columns.texts}
     values |= {columns.names[at]: column for at, column in zip(columns.numeric, numbers, strict=True)}
-    return from_variables({name: values[name] for name in columns.names}, {**heading.units})
+    facts = {name: ChannelFacts(unit=unit) for name, unit in heading.units.items()}
+    return from_variables({name: values[name] for name in columns.names}, facts)
 
 
 def _split(found: Blocks, layout: CsvLayout) -> tuple[Heading | None, Blocks]:

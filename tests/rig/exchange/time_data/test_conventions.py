@@ -24,9 +24,9 @@ from rig.exchange.reading import import_file
 from tests.rig.exchange.time_data.convention_writers import (
     MOTIONS,
     POUND,
-    REFUSED,
+    REFUSED as REFUSED_FIRST,
     UNITS,
-    USED,
+    USED as USED_FIRST,
     VALUES,
     Case,
     N,
@@ -41,11 +41,20 @@ from tests.rig.exchange.time_data.convention_writers import (
     sep005_starts,
     tdms_starts,
 )
+from tests.rig.exchange.time_data.spelling_writers import (
+    REFUSED_AS_WELL,
+    USED_AS_WELL,
+    csv_starts,
+)
 
-LATE = (tdms_starts, mdf_starts, sep005_starts, lvm_starts, hdf5_starts)
+USED = {key: (*USED_FIRST.get(key, ()), *USED_AS_WELL.get(key, ())) for key in (USED_FIRST | USED_AS_WELL)}
+REFUSED = {
+    key: (*REFUSED_FIRST.get(key, ()), *REFUSED_AS_WELL.get(key, ())) for key in (REFUSED_FIRST | REFUSED_AS_WELL)
+}
+LATE = (tdms_starts, mdf_starts, sep005_starts, lvm_starts, hdf5_starts, csv_starts)
 PAGE = Path(__file__).parents[4] / "docs" / "reference" / "exchange.md"
 ENDINGS = {"MAT": ".mat", "CSV": ".csv", "HDF5": ".h5", "TDMS": ".tdms", "MDF 4": ".mf4", "SEP005": ".json"}
-ENDINGS |= {"NumPy": ".npz", "workbook": ".xlsx", "LabVIEW": ".lvm"}
+ENDINGS |= {"NumPy": ".npz", "workbook": ".xlsx", "LabVIEW": ".lvm", "WAV": ".wav"}
 EXAMPLE = {"force": "lbf", "motion": "g", "time": "ms", "rate": 2048.0, "scale": 0.25, "offset": -1.5, "late": 4}
 
 
@@ -67,13 +76,15 @@ def mapping(of: Case, force_unit: str = "", more: str = "") -> str:
     units = ("N", "m/s2") if of.get("in_si") else (of["force"], of["motion"])
     channels = (("f", "force", force_unit or units[0], force, more), ("m", "drive", units[1], motion, ""))
     lines = ['kind = "time-data"', of.get("more", "")]
-    for name, role, unit, path, further in channels:
+    lines += ['axes = ["sample", "channel"]'] if of.get("matrix") else []
+    for number, (name, role, unit, path, further) in enumerate(channels, 1):
         lines += [
             "[[channels]]",
             f'name = "{name}"',
             f'role = "{role}"',
             f"unit = {json.dumps(unit)}",
             f"value = {json.dumps(path)}",
+            f"index = {number}" if of.get("matrix") else "",
             further,
         ]
     return "\n".join(lines)
@@ -86,7 +97,7 @@ def imported(write: Writer, ending: str, of: Case, **options: str) -> tuple[Time
         text = mapping(told, **options)
         if (
             not any(key in told.get("more", "") for key in ("time",))
-            and ending in (".mat", ".csv", ".h5")
+            and ending in (".mat", ".csv", ".h5", ".npz")
             and write not in LATE
         ):
             text = f"sample_rate_hz = {told['rate']}\n{text}"
