@@ -14,6 +14,7 @@ _UNEVEN = 1e-3
 _ULPS = 4.0  # errors of the last bit in an instant that was computed; chosen
 _FEW = 16
 """Instants below which a rounding may be `_FINE` of a step: a few agree with some even grid by chance; chosen."""
+_FIRST = 64  # numbers that are looked at before all the others
 _FINE = 0.1
 _DIGITS = range(1, 16)  # digits of rates and steps that are tried, the roundest first
 _DECIMALS = range(-3, 13)  # decimals of print that are tried
@@ -89,13 +90,13 @@ def _half_digits(t: Float, *, single: bool) -> Iterator[tuple[Float, bool]]:
     if bool(np.all(t == t.astype(np.float32))):
         yield spacing, True
     for decimals in _DECIMALS:
-        if _is_whole(t * 10.0**decimals):
+        if _is_whole(t[:_FIRST] * 10.0**decimals) and _is_whole(t * 10.0**decimals):
             yield np.full(t.size, 0.5001 * 10.0**-decimals), True
             break
     powers = np.floor(np.log10(np.abs(np.where(t == 0.0, 1.0, t))))
     for digits in _SIGNIFICANT:
         quantum = 10.0 ** (powers - digits + 1)
-        if _is_whole(t / quantum):
+        if _is_whole(t[:_FIRST] / quantum[:_FIRST]) and _is_whole(t / quantum):
             yield 0.5001 * quantum, True
             break
 

@@ -11,6 +11,7 @@ from identification.experiments.periodicity import check_periods, period_remark
 from identification.experiments.time_experiments import resampled_periods
 from identification.experiments.time_records import TimeRecord, TimeRecords
 from identification.mapping.base import entries_at, in_si, notes_of, value_at
+from identification.mapping.instants import EvenSampling
 from identification.mapping.sampling import (
     WHOLE,
     check_rates_beside,
@@ -116,6 +117,7 @@ def _raw_records(
 ) -> list[_Raw]:
     """Return the records in one structure: all channels side by side, on one grid of instants."""
     _, factors = in_si(mapping.channels)
+    instants: dict[tuple[str, float | None], EvenSampling] = {}
     found, told, starts, rounded_s = [], {"sample_rate_hz": mapping.sample_rate_hz}, [], 0.0
     for channel, factor in zip(mapping.channels, factors, strict=True):
         label = f"{where}channels.{channel.name}"
@@ -124,7 +126,7 @@ def _raw_records(
         )
         offset = 0.0 if channel.offset == "mean" else channel.offset
         found.append(replace(stored, values=(stored.values - offset) * (channel.scale * factor)))
-        rates, start, rounded = _sampling(entries[channel.file], files[channel.file], mapping, channel)
+        rates, start, rounded = _sampling(entries[channel.file], files[channel.file], mapping, channel, instants)
         told |= rates
         starts.append(start)
         rounded_s = max(rounded_s, rounded)
@@ -151,14 +153,24 @@ def _raw_records(
 
 
 def _sampling(
-    entry: Any, file: Any, mapping: TimeDataMapping, channel: SampledChannel
+    entry: Any,
+    file: Any,
+    mapping: TimeDataMapping,
+    channel: SampledChannel,
+    instants: dict[tuple[str, float | None], EvenSampling],
 ) -> tuple[dict[str, float | None], float, float]:
-    """Return the sample rates told of a channel, by where they are from, its first instant, and the rounding of instants, s."""
+    """Return the sample rates told of a channel, by where they are from, its first instant, and the rounding of instants, s.
+
+    ``instants`` holds the sampling of the instants that were judged for other channels, by file and wanted rate.
+    """
     told = rates_of_file(file, [channel.value], channel.file or "file")
     start, rounded_s = start_of_file_s(file, channel.value), 0.0
     if mapping.time is not None and _holds(entry, mapping.time, alone=not channel.file):
         wanted = next((rate for rate in (mapping.sample_rate_hz, *told.values()) if rate is not None), None)
-        found = instants_at(entry, mapping.time, seconds_of_time(file, mapping.time_unit), wanted)
+        found = instants.get((channel.file, wanted))
+        if found is None:
+            found = instants_at(entry, mapping.time, seconds_of_time(file, mapping.time_unit), wanted)
+            instants[channel.file, wanted] = found
         told[f"time{' of ' if channel.file else ''}{channel.file}"] = found.rate_hz
         start, rounded_s = start + found.start_s, found.rounded_s
     return told, start, rounded_s

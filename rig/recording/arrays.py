@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.errors import RecordingError
+from rig.recording.compression import COMPRESSED, shrinks
 from rig.recording.journal import journal_path
 from rig.recording.journal_blocks import JournalBlocks
 from rig.recording.layout import identify, kind_in, new_file, open_file, reading
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
 _COMPRESSED_FROM_BYTES = 65536  # smaller arrays gain nothing; chosen
+_TRIED = 8192  # values in the middle by which it is judged whether compression pays; chosen
 
 
 def write_arrays(
@@ -63,7 +65,8 @@ def _write_array(group: "h5py.Group", name: str, values: np.ndarray) -> None:
         group.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype("utf-8"))
     else:
         large = values.ndim > 0 and values.nbytes >= _COMPRESSED_FROM_BYTES
-        group.create_dataset(name, data=values, **({"compression": "lzf", "shuffle": True} if large else {}))
+        middle = values.reshape(-1)[max(values.size - _TRIED, 0) // 2 :][:_TRIED]
+        group.create_dataset(name, data=values, **(COMPRESSED if large and shrinks(middle) else {}))
 
 
 def read_arrays(path: str | Path) -> tuple[str, dict[str, np.ndarray], dict[str, Any]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from rig.errors import RecordingError
+from rig.recording.compression import COMPRESSED, shrinks
 from rig.recording.header import Column, Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.layout import file_integrity, identify, kind_in, open_unchecked, reading
@@ -17,8 +18,7 @@ from rig.recording.tables import StoredTexts, write_object, write_table
 if TYPE_CHECKING:
     import h5py
 
-_COMPRESSED: dict[str, str | bool] = {"compression": "lzf", "shuffle": True, "fletcher32": True}
-_WORTH_IT = 0.6  # of its size: a field that stays larger when compressed is stored as it is
+_CHECKED = {"fletcher32": True}
 _TAKEN_OVER = "taken over from an unverified file"
 
 
@@ -108,7 +108,7 @@ def _write_part(group: "h5py.Group", part: Part, check: Callable[[], None]) -> N
     shrinking = _shrinking(part, step)
     datasets = {}
     for column, field in columns:
-        compressed = _COMPRESSED if column.name in shrinking else {}
+        compressed = COMPRESSED | _CHECKED if column.name in shrinking else {}
         storage = {"chunks": (min(step, part.n_rows), *field.shape), **compressed} if part.n_rows else {}
         dataset = group.create_dataset(f"rows/{column.name}", (part.n_rows, *field.shape), field.base, **storage)
         dataset.attrs["unit"], dataset.attrs["description"] = column.unit, column.description
@@ -126,26 +126,13 @@ def _write_part(group: "h5py.Group", part: Part, check: Callable[[], None]) -> N
 
 
 def _shrinking(part: Part, step: int) -> set[str]:
-    """Names of the fields that are worth compressing, judged by a chunk in the middle of a part.
-
-    Measured values are noise in their lower digits: to compress them would take longer than all else and save a third.
-    """
-    import h5py
-
+    """Names of the fields that are worth compressing, judged by a chunk in the middle of a part."""
     names = set(part.row_dtype.names or ())
     if part.n_rows < step:
         return names
     first = part.n_rows // step // 2 * step
     rows = part.read(first, min(first + step, part.n_rows))
-    with h5py.File("in memory", "w", driver="core", backing_store=False) as trial:
-        for name in sorted(names):
-            values = rows[name]
-            if values.dtype.kind in "fc":
-                dataset = trial.create_dataset(name, data=values, chunks=values.shape, **_COMPRESSED)
-                trial.flush()
-                if dataset.id.get_storage_size() > _WORTH_IT * values.nbytes:
-                    names.remove(name)
-    return names
+    return {name for name in names if rows[name].dtype.kind not in "fc" or shrinks(rows[name], **_CHECKED)}
 
 
 def _whole_chunk(values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

@@ -29,13 +29,13 @@ def encoding_of(path: Path) -> str:
         known = next((name for mark, name in _MARKS.items() if block.startswith(mark)), "") or _wide(block)
         if known:
             return known
-        decoder, place, wrong = codecs.getincrementaldecoder("utf-8")(), 0, ""
+        decoder, place, wrong, plain = codecs.getincrementaldecoder("utf-8")(), 0, "", True
         while True:
             if len(block.translate(None, _NO_TEXT)) < len(block):
                 at = place + next(at for at, byte in enumerate(block) if byte in _NO_TEXT)
                 raise ImportFailed(f"{path}: is no text in UTF-8 ({wrong or f'byte {at}: a control character'})")
             try:
-                if not wrong:
+                if not wrong and not (plain := plain and block.isascii()):
                     decoder.decode(block, final=not block)
             except UnicodeDecodeError as error:
                 wrong = f"byte {place + error.start}: {error.reason}"
