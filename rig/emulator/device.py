@@ -32,7 +32,7 @@ from rig.wire.messages import (
 )
 
 BEAT_S = 1.0 / HEARTBEATS_HZ  # between two heartbeats
-COUNTED = {DeviceFlag.OUTPUT_HELD: "held_blocks", DeviceFlag.OUTPUT_CONTINUED: "continued_blocks"}
+COUNTED = {int(DeviceFlag.OUTPUT_HELD): "held_blocks", int(DeviceFlag.OUTPUT_CONTINUED): "continued_blocks"}
 
 
 class Device:
@@ -226,9 +226,9 @@ class Device:
     def _measure(self, now_s: float) -> None:
         latch = self._states.latch
         first, readings, flags, put_out = self._sampling.measure()
-        for flag, name in COUNTED.items():
-            if flags & flag:
-                self.counts[name] += 1
+        if flags & MISSED:
+            for flag, name in COUNTED.items():
+                self.counts[name] += bool(flags & flag)
         if self.faults.channels_sent is not None:
             readings = readings[:, : self.faults.channels_sent]
         number = self._sampling.blocks

@@ -10,6 +10,7 @@ import numpy as np
 
 from rig.continuation import SOURCE, begin, count_at, forget, keep, ring_for
 from rig.wire.messages import Output
+from vibrolock.compiled import bound
 
 
 class Converter:
@@ -65,10 +66,12 @@ class Due(NamedTuple):
 
     counts: np.ndarray
     """int64[n]."""
-    has_come: np.ndarray
-    """bool[n]: it has come in time."""
-    continued: np.ndarray
-    """bool[n]: it has not, and the device goes on with this one."""
+    there: np.ndarray
+    """bool[n]: it has come in time, or the device goes on with this one."""
+    is_whole: bool
+    """Whether all are there."""
+    is_continued: bool
+    """Whether the device goes on with one that has not come."""
 
 
 BLOCKS_AHEAD = 4  # blocks beyond the queue by which a host may be early
@@ -88,6 +91,7 @@ class OutputQueue:
         self._there = np.zeros(self._size, bool)
         self._source, self._sent = np.zeros(1, SOURCE)[0], ring_for(longest_period)
         begin(self._source, longest_period)
+        self._keep = bound(keep, self._source, self._sent, 0, self._values[:block], 0, 0)
 
     def put(self, output: Output, present: int) -> int | None:
         """Keep the outputs of a block; those due before sample ``present`` are too late.
@@ -100,7 +104,7 @@ class OutputQueue:
         if first + block > present - present % block + self._size:
             return None
         counts = output.counts.astype(np.int64)
-        keep(self._source, self._sent, first, counts, output.period, output.ramp)
+        self._keep(self._source, self._sent, first, counts, output.period, output.ramp)
         late = min(max(0, present - first), block)
         slot = first % self._size
         self._values[slot + late : slot + block] = counts[late:]
@@ -119,12 +123,15 @@ class OutputQueue:
     def take(self, first: int, end: int) -> Due:
         """Outputs of samples ``first`` to before ``end`` of one block; frees their slots."""
         slot = slice(first % self._size, first % self._size + end - first)
-        counts, has_come = self._values[slot].copy(), self._there[slot].copy()
+        counts, there = self._values[slot].copy(), self._there[slot].copy()
         self._there[slot] = False
-        continued = ~has_come if self._source["period"] else np.zeros(has_come.size, bool)
-        for index in np.flatnonzero(continued):
-            counts[index] = self.count_at(first + int(index))
-        return Due(counts, has_come, continued)
+        has_come = bool(there.all())
+        goes_on = not has_come and bool(self._source["period"])
+        if goes_on:
+            for index in np.flatnonzero(~there):
+                counts[index] = self.count_at(first + int(index))
+            there.fill(True)
+        return Due(counts, there, has_come or goes_on, goes_on)
 
     def count_at(self, instant: int) -> int:
         """The count with which to go on at an instant, where there is a source."""

@@ -8,6 +8,8 @@ from rig.emulator.parameters import Parameters
 from rig.emulator.sampling import Sampling
 from rig.wire.messages import ARM_KEY, DeviceFlag, DeviceState, Parameter, Status
 
+ARMED = DeviceState.ARMED  # a member of an Enum is looked up slowly, and this one is asked for with every message
+
 
 class StateMachine:
     """States and the transitions between them.
@@ -35,7 +37,7 @@ class StateMachine:
 
     def feed(self, now_s: float, *, in_time: bool) -> None:
         """Note a valid output. One that is entirely late reaches no converter, so it does not feed the watchdog."""
-        if self.state is DeviceState.ARMED:
+        if self.state is ARMED:
             self._fed_s = now_s if in_time else self._fed_s
 
     def stand_still(self, late_s: float) -> None:
@@ -45,7 +47,7 @@ class StateMachine:
     def watch(self, now_s: float) -> None:
         """Trip the watchdog if its time is over."""
         bites_s = self.bites_s
-        if now_s >= bites_s and self.state is DeviceState.ARMED:
+        if now_s >= bites_s and self.state is ARMED:
             self._counts["watchdog_trips"] += 1
             ramp_s = 1e-6 * self._parameters.value(Parameter.RAMP_US)
             self._bring_down(bites_s, DeviceState.LATCHED, ramp_s, DeviceFlag.WATCHDOG)

@@ -21,6 +21,7 @@ from rig.tick.sequencer.layout import PROGRESS, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz, segment_table
 
 JUDGED_AGAIN = 11.0  # periods
+OFF = int(GuardMode.OFF)  # a member of an Enum is looked up slowly
 SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude
 
 
@@ -165,9 +166,7 @@ class Tick:
     @property
     def over(self) -> bool:
         """Whether the output is off for good and the device's queue holds no more output of the run."""
-        if (
-            self.arrays.guard["mode"][0] != GuardMode.OFF
-        ):  # asked after every block, which a kernel's call would outlast
+        if self.arrays.guard["mode"][0] != OFF:  # asked after every block, which a kernel's call would outlast
             return False
         return is_over(self.arrays.guard[0], int(self.arrays.loop["delay_whole"][0]))
 

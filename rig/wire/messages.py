@@ -83,9 +83,9 @@ class DeviceFlag(IntFlag):
     """An output did not arrive in time: the device went on with the last period (version 2)."""
 
 
-STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
+STOPPED = int(DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP)  # asked for with every block, where members are slow
 """Flags of a device that has brought its output to 0 V by itself."""
-MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED
+MISSED = int(DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED)
 """Flags of a block in which an output did not arrive in time."""
 
 

@@ -174,7 +174,7 @@ class Connection:
         """Flags that have latched, from the next heartbeat; without a heartbeat all flags that can latch."""
         if self.dialogue.get(Parameter.STATE) != DeviceState.LATCHED:
             return NOTHING
-        return DeviceFlag(self.dialogue.beat_with(STOPPED, HEARTBEAT_S)) or STOPPED
+        return DeviceFlag(self.dialogue.beat_with(STOPPED, HEARTBEAT_S) or STOPPED)
 
     def set(self, parameter: Parameter, value: int, key: str, scale: float, unit: str) -> None:
         """Set a parameter; ``key``, ``scale`` and ``unit`` say in an error what the bench calls it."""
