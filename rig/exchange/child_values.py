@@ -3,17 +3,19 @@
 import json
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, TypeGuard
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import JsonValue
 
 from rig.errors import RigError
 from rig.exchange.file_data import ChannelFacts, FileData, MappingText, StoredObject
 from rig.exchange.universal_file import Axis, Function, ModeShape, UnitSystem, UniversalFile
 from rig.recording.examination import LARGEST_RATIO, SMALL_BYTES
 from rig.system.child import MEMORY_BYTES
+
+if TYPE_CHECKING:
+    from pydantic import JsonValue
 
 MOST_BYTES = 2_000_000_000
 """Most memory that the contents of a file of any size may take, bytes; chosen: half of what the child may use."""
@@ -59,7 +61,7 @@ class _Encoder:
     def __init__(self, numbers: BinaryIO, most: int) -> None:
         self._numbers, self._most, self._left = numbers, most, most
 
-    def encode(self, value: object) -> JsonValue:
+    def encode(self, value: object) -> "JsonValue":
         """Return the tree of a value, with places among the numbers in place of arrays."""
         self._spend(_ITEM_BYTES)
         if value is None or isinstance(value, bool):
