@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-import scipy
 
 from vibrolock.arrays import Float
 
@@ -105,9 +104,10 @@ def solve_modes(stiffness: Float, mass: Float, n_mode: int, shift: float) -> tup
     The problem is solved as ``M v = mu (K + shift M) v``. The wanted modes are then the largest eigenvalues and lose no digits
     to the highest modes, and K may be singular (rigid-body modes). ``shift`` (rad/s)^2 is about ``omega^2`` of the lowest mode.
     """
-    n = mass.shape[0]
-    mu, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
-    return np.maximum(1.0 / mu[::-1] - shift, 0.0), vectors[:, ::-1] / np.sqrt(mu[::-1])
+    lower = np.linalg.cholesky(stiffness + shift * mass)
+    mu, vectors = np.linalg.eigh(np.linalg.solve(lower, np.linalg.solve(lower, mass).T))
+    mu, vectors = mu[: -n_mode - 1 : -1], np.linalg.solve(lower.T, vectors[:, : -n_mode - 1 : -1])
+    return np.maximum(1.0 / mu - shift, 0.0), vectors / np.sqrt(mu)
 
 
 def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[Float, Float]:

@@ -61,6 +61,28 @@ def test_phi_matrices_are_the_integrals_they_stand_for() -> None:
     assert phi.ramp == pytest.approx(ramp, rel=1e-10)
 
 
+def test_small_elements_of_the_transition_keep_their_digits_as_in_an_exponential_of_longer_numbers() -> None:
+    """A mode of 900 Hz over a step of 25 us, whose acceleration is ten million times its displacement."""
+    omega = 2.0 * np.pi * 900.0
+    dynamics, columns = np.array([[0.0, 1.0], [-(omega**2), -0.02 * omega]]), np.array([[0.0], [3.0]])
+    step = 25e-6
+    phi = phi_matrices(dynamics, columns, step)
+    augmented = step * np.block([[dynamics, columns], [np.zeros((1, 3))]]).astype(np.longdouble)
+    exact = term = np.eye(3, dtype=np.longdouble)
+    for order in range(1, 60):
+        term = term @ augmented / order
+        exact = exact + term
+    np.testing.assert_allclose(np.hstack([phi.transition, phi.held]), exact[:2].astype(float), rtol=1e-13)
+    np.testing.assert_allclose(phi.transition, expm(step * dynamics), rtol=1e-9)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-6, 3.0, 400.0])
+def test_the_transition_is_the_exponential_over_any_step(step: float) -> None:
+    dynamics = np.random.default_rng(2).normal(size=(6, 6)) - 4.0 * np.eye(6)
+    transition = phi_matrices(dynamics, np.zeros((6, 1)), step).transition
+    np.testing.assert_allclose(transition, expm(step * dynamics), rtol=1e-9, atol=1e-13)
+
+
 def test_linear_part_is_exact_whatever_the_step() -> None:
     # With hardly any magnet the rig is linear, and a sample with one sub-step is as good as one with eight.
     weak = [{"kind": "magnet-one-sided", "at": "magnet", "strength_n_m4": 1e-30, "gap_m": 0.011}]

@@ -1,5 +1,8 @@
 """Linear algebra is limited to one thread for as long as it is asked for."""
 
+import subprocess
+import sys
+
 import scipy
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -21,3 +24,13 @@ def test_one_thread_is_used_inside_and_as_many_as_before_after():
 
 def test_as_a_decorator_it_holds_while_the_function_runs():
     assert one_thread()(threads)() == {1}
+
+
+def test_a_virtual_rig_is_opened_without_loading_scipy():
+    code = (
+        "import sys; from rig.bench import load_bench; from rig.drivers import make_daq; "
+        "daq = make_daq(load_bench('magnet-beam')); daq.open(); daq.start(1); daq.close(); "
+        "print('scipy.linalg' in sys.modules)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert answer.stdout.split() == ["False"]

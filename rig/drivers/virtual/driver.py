@@ -73,7 +73,7 @@ class VirtualDAQ(DAQ):
         self.rig = validated(VirtualRig, options, "driver.options")
         self._wears = self.rig.wear.wears
         self._compare_channels()
-        self._check_arrays(seed)
+        arrays = self._checked_arrays(seed)
         self._seed = seed
         self._specimen = bench.specimen
         self._counts = np.zeros(len(COUNTED), np.int64)
@@ -83,9 +83,9 @@ class VirtualDAQ(DAQ):
             raise ConfigurationError(
                 field="driver.options.at_zero_v", value=self._how, allowed="'attached' for a specimen that wears"
             )
-        attached = self.rig.realised(seed)
-        released = attached if self._how == "attached" else attached.released(self._how)
-        self._released = released.build(seed)[0]
+        if self._how != "attached":
+            arrays = self.rig.realised(seed).released(self._how).build(seed)[0]
+        self._released = arrays
         """Arrays of the rig while the output is 0 V; those of the rig itself if its exciter stays attached."""
         self._exchanged = self._converters(0, loopback_of(self.channels, 0.0), self._faults(bench.block))
         self._first = 0
@@ -111,8 +111,8 @@ class VirtualDAQ(DAQ):
         releases = self._how != "attached"
         return Converters(np.zeros(queue_samples), self._counts, loopback, faults, releases, self._released)
 
-    def _check_arrays(self, seed: int) -> None:
-        """Refuse, before a run begins, parts whose arrays cannot be computed or are not finite."""
+    def _checked_arrays(self, seed: int) -> RigArrays:
+        """Arrays of the rig; refuses, before a run begins, parts whose arrays cannot be computed or are not finite."""
         try:
             with np.errstate(over="raise", divide="raise", invalid="raise"):
                 arrays, _ = self.rig.build(seed)
@@ -133,6 +133,7 @@ class VirtualDAQ(DAQ):
                 "too large or small beside the others",
                 field="driver.options",
             )
+        return arrays
 
     def _compare_channels(self) -> None:
         ours = [channel.name for channel in self.channels]

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from simulators.structures.beam import BeamModes, Boundary, Lump, Quantity, Spring, beam_modes
+from simulators.structures.beam import BeamModes, Boundary, Lump, Quantity, Spring, beam_modes, solve_modes
 
 LENGTH_M, STIFFNESS, MASS = 0.55, 184.0, 1.3
 CLAMPED_FREE = (1.8751040687, 4.6940911330, 7.8547574382, 10.9955407349)
@@ -110,3 +111,13 @@ def test_slope_and_curvature_are_the_derivatives_of_the_deflection(position_m: f
     assert modes.shape(position_m, "slope") == pytest.approx((right - left) / (2 * step), rel=1e-6, abs=1e-5)
     assert modes.shape(position_m, "curvature") == pytest.approx(slopes / (2 * step), rel=1e-6, abs=1e-4)
     assert np.all(np.isfinite(here))
+
+
+def test_modes_are_those_of_the_general_eigenvalue_problem() -> None:
+    random = np.random.default_rng(4)
+    factors = random.normal(size=(2, 12, 12)) + 4.0 * np.eye(12)
+    stiffness, mass = (factor @ factor.T for factor in factors)
+    squared, vectors = solve_modes(stiffness, mass, 5, 1.0)
+    expected, shapes = eigh(stiffness, mass)
+    np.testing.assert_allclose(squared, expected[:5], rtol=1e-10)
+    np.testing.assert_allclose(np.abs(shapes[:, :5].T @ mass @ vectors), np.eye(5), atol=1e-9)
