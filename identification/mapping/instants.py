@@ -16,6 +16,7 @@ _FEW = 16
 """Instants below which a rounding may be `_FINE` of a step: a few agree with some even grid by chance; chosen."""
 _FIRST = 64  # numbers that are looked at before all the others
 _FINE = 0.1
+_MOST_LAST = 10  # instants at the end that may be something else, such as largest and mean values; chosen
 _DIGITS = range(1, 16)  # digits of rates and steps that are tried, the roundest first
 _DECIMALS = range(-3, 13)  # decimals of print that are tried
 _SIGNIFICANT = range(3, 13)  # significant digits of print that are tried
@@ -73,6 +74,9 @@ def uneven_remark(instants: NDArray[Any]) -> str:
     usual = float(np.median(steps))
     at = int(np.argmax(np.abs(steps - usual)))
     where = f"from [{at}] to [{at + 1}] it steps by {steps[at]:.6g}, usually by {usual:.6g}"
+    if (after := t.size - 1 - at) <= _MOST_LAST < at:
+        csv = f"csv = {{ skip_last_lines = {after} }}"
+        return f"goes on otherwise at its end ({where}); leave out the last {after}, of a CSV file by `{csv}`"
     if usual <= 0.0:
         return f"does not increase ({where}); give sample_rate_hz in place of time"
     gaps = np.mean(np.abs(steps - usual) > 0.5 * usual)

@@ -15,7 +15,17 @@ from pydantic import Field
 from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
 from identification.errors import IdentificationError
 from identification.frequency_responses import Controlled, FrequencyResponse
-from identification.mapping.base import MappingTable, MeasurementMapping, Path, Positive, as_levels, numbers, value_at
+from identification.mapping.base import (
+    MappingTable,
+    MeasurementMapping,
+    Path,
+    Positive,
+    as_levels,
+    numbers,
+    one_of,
+    said_of,
+    value_at,
+)
 from identification.mapping.units import si_of
 from vibrolock.arrays import Complex
 
@@ -32,6 +42,9 @@ class Units(MappingTable):
     """Unit of the forces."""
     response: Literal["m", "mm", "um", "in", "m/s", "mm/s", "in/s", "m/s2", "m/s^2", "mm/s2", "in/s2", "g"]
     """Unit of the response amplitudes; it also says whether they are displacement, velocity or acceleration."""
+    amplitude_unit: Literal["linear", "dB"] | None = None
+    """``dB`` for responses in decibels, ``20 log10`` of the amplitude in ``response``; if left out, as the file says of the
+    values, also by the end of the name of the column (``X [dB]``), else linear."""
     values: Literal["peak", "rms"]
     """Whether forces, responses and level values are stored as peak or as RMS."""
 
@@ -109,7 +122,12 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
         if group.level_values and len(group.level_values) != len(levels):
             reason = f"{len(group.level_values)} given, the data has {len(levels)} levels"
             raise IdentificationError(reason, field=f"{where}.level_values")
-        found += [_response(level, index, group, mapping, where) for index, level in enumerate(levels)]
+        said = "dB" if said_of(data, group.response).lower().startswith("db") else ""
+        unit = one_of(mapping.units.amplitude_unit, said, "linear", "units.amplitude_unit", group.response)
+        for index, level in enumerate(levels):
+            if unit == "dB" and not np.iscomplexobj(level["response"]):
+                level["response"] = 10.0 ** (level["response"] / 20.0)
+            found.append(_response(level, index, group, mapping, where))
     return tuple(found)
 
 
@@ -153,7 +171,8 @@ def _response(
     for name in ("force", "response"):
         if not np.iscomplexobj(stored[name]) and np.any(stored[name] < 0.0):
             raise IdentificationError(
-                f"{where}.{name}, level {index + 1}: an amplitude is below zero; check the path, and convert decibels"
+                f"{where}.{name}, level {index + 1}: an amplitude is below zero; check the path; amplitudes in "
+                'decibels need units.amplitude_unit = "dB"'
             )
     force = np.asarray(stored["force"] * (force_scale * peak), dtype=np.complex128)
     response = np.asarray(stored["response"] * (response_scale * peak), dtype=np.complex128)

@@ -112,7 +112,7 @@ def _of_levels(mapping: "i.FrequencyResponseMapping") -> Iterator[Use]:
             ("force", group.force, units.force),
             ("response", group.response, units.response),
         ):
-            yield replace(about, where=f"units.{key}", path=path, unit=unit)
+            yield replace(about, where=f"units.{key}", path=path, unit=unit, amplitude=key == "response")
         if group.phase is not None:
             yield replace(about, where="phase.unit", path=group.phase, unit=phase.unit if phase else "")
 

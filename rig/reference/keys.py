@@ -125,7 +125,7 @@ def keys_of(table: str) -> tuple[Key, ...]:
             default="required" if name in required else _default(field.get("default")),
             allowed=_allowed(field),
             meaning=" ".join(field.get("description", "").split()).replace("``", "`"),
-            holds=_tables_in(model.model_fields[name].annotation),
+            holds=_tables_in(model.model_fields[name].annotation) if name in model.model_fields else (),
         )
         for name, field in sorted(schema["properties"].items(), key=lambda item: item[0] != "kind")
     )
@@ -191,7 +191,8 @@ def key_entries() -> Iterator[Entry]:
         line = " ".join(str(model.__doc__).partition("\n\n")[0].split()).replace("``", "`")
         yield Entry("table", name, tuple(dict.fromkeys((name, name.replace("-", "_")))), line, f"keys-{name}")
         for key in keys_of(name):
-            full, alias = f"{name}.{key.name}", model.model_fields[key.name].validation_alias
+            field = model.model_fields.get(key.name)
+            full, alias = f"{name}.{key.name}", field.validation_alias if field is not None else None
             others = alias.choices if isinstance(alias, AliasChoices) else ()
             other_names = [str(one) for one in others if one != key.name]
             words = (full,) if key.name in key.holds else (key.name, full, *other_names)

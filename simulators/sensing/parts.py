@@ -1,9 +1,9 @@
 """Configuration of sensors and converters."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from simulators.part import NotNegative, Part, Positive
 from vibrolock.data_sheet import volts_per_unit
@@ -20,11 +20,22 @@ Bits = Annotated[int, Field(ge=0, le=32)]
 Order = Annotated[int, Field(ge=1, le=8)]
 
 
+def _either_sensitivity(schema: dict[str, Any]) -> None:
+    """Let a schema have the sensitivity of a data sheet in place of that in volts per unit."""
+    keys = ("sensitivity_v_per_unit", "sensitivity")
+    described = {"type": "string", "description": "Sensitivity as on a data sheet: ``10 mV/g``, ``22.4 mV/N``."}
+    schema["properties"]["sensitivity"] = described
+    schema["required"] = [key for key in schema["required"] if key not in keys]
+    schema["oneOf"] = [{"required": [key]} for key in keys]
+
+
 class Sensor(Part):
     """A piezo sensor and its conditioner.
 
     Not modelled: resonance of the sensor, drift, cross-axis sensitivity.
     """
+
+    model_config = ConfigDict(json_schema_extra=_either_sensitivity)
 
     name: Annotated[str, Field(min_length=1)]
     """Name of its channel."""

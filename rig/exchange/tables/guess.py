@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 from identification.mapping import CsvLayout, Encoding
 from rig.exchange.child_reading import ImportFailed
+from rig.exchange.tables.clocks import is_clock
 from rig.exchange.tables.heading import are_units_above
 from rig.exchange.tables.rows import cells_of
 from rig.exchange.tables.text import blocks, encoding_of, table_lines
@@ -131,7 +132,10 @@ def _first_row(lines: Sequence[str], separator: str, decimal: str, texts: bool) 
 
 def _shape(line: str, separator: str, decimal: str) -> str:
     """Return a letter for each cell of a line: n for a number, t for a text."""
-    numbers = (bool(_NUMBER[decimal].match(cell)) or cell.lower() == "nan" for cell in _cells(line, separator))
+    numbers = (
+        bool(_NUMBER[decimal].match(cell)) or cell.lower() == "nan" or is_clock(cell)
+        for cell in _cells(line, separator)
+    )
     return "".join("n" if number else "t" for number in numbers)
 
 

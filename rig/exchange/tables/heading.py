@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from identification.mapping import CsvLayout
 from rig.exchange.child_reading import ImportFailed
+from rig.exchange.tables.clocks import is_clock
 from rig.exchange.tables.rows import Columns, cells_of
 from vibrolock.quantities import quantity
 
@@ -54,11 +55,14 @@ def heading_of(lines: Lines, layout: CsvLayout) -> Heading | None:
             }
             above.append(line)
             continue
+        clocks = frozenset(column for column, cell in enumerate(cells[: len(names)]) if is_clock(cell))
+        units |= {names[column]: "s" for column in clocks}
         columns = Columns(
             plain.names,
             separator,
             layout.decimal,
-            texts=_texts(plain, [cells, *(cells_of(one, separator) for _, one in lines[at + 1 : at + 2])]),
+            texts=_texts(plain, [cells, *(cells_of(one, separator) for _, one in lines[at + 1 : at + 2])]) - clocks,
+            clocks=clocks,
             extra=max(len(cells) - len(names), 0),
             heading=frozenset(one.strip() for one in above),
         )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.exchange.child_reading import ImportFailed
+from rig.exchange.tables.clocks import in_seconds
 from rig.exchange.tables.text import is_row
 from vibrolock.arrays import Float
 
@@ -36,6 +37,8 @@ class Columns:
     decimal: str
     texts: frozenset[int] = frozenset()
     """Numbers of the columns that hold texts, which are not read, from 0."""
+    clocks: frozenset[int] = frozenset()
+    """Numbers of the columns that hold times of day, which become seconds, from 0."""
     extra: int = 0
     """Separators at the end of each line, behind which nothing stands."""
     heading: frozenset[str] = frozenset()
@@ -51,6 +54,7 @@ class Columns:
 
         Raises `RowFailed`.
         """
+        block = in_seconds(block, self.decimal) if self.clocks else block
         quick = self._quick(block)
         if quick is not None:
             return quick
@@ -73,7 +77,7 @@ class Columns:
         """Return the numbers in a line; empty for a comment, an empty line, or one of the heading."""
         if not is_row(line) or line.strip() in self.heading:
             return []
-        cells = cells_of(line, self.separator)
+        cells = cells_of(in_seconds(line, self.decimal) if self.clocks else line, self.separator)
         count = len(self.names)
         if len(cells) < count or any(cell.strip() for cell in cells[count:]):
             wrong = next((cell for cell in cells if cell.strip() and self.number(cell) is None), "")

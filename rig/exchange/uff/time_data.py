@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mapping import even_sampling
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.file_data import ChannelFacts, FileData
 from rig.exchange.uff.units import FileUnits, file_units, seconds_of
@@ -180,7 +181,12 @@ def _sampling(function: Function) -> tuple[float, float]:
     """
     seconds = seconds_of(function)
     step = function.step * seconds
-    if not function.even or step <= 0.0:
+    if not function.even:
+        found = even_sampling(function.x, seconds)
+        if found is None:
+            raise ImportFailed(f"{function.where}: its instants are not evenly spaced; resample it")
+        return found.rate_hz, found.start_s
+    if step <= 0.0:
         raise ImportFailed(f"{function.where}: is not evenly sampled; wanted is a step above zero")
     start = float(function.x[0]) * seconds if function.x.size else 0.0
     rate = 1.0 / step

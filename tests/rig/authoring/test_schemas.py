@@ -293,6 +293,23 @@ def test_a_channel_gives_its_sensitivity_in_one_of_three_ways():
 
 
 @pytest.mark.parametrize(
+    ("given", "fits"),
+    [
+        ({"sensitivity": "22.4 mV/N"}, True),
+        ({"sensitivity_v_per_unit": 0.0224}, True),
+        ({}, False),
+        ({"sensitivity": "22.4 mV/N", "sensitivity_v_per_unit": 0.0224}, False),
+        ({"sensitivity": 22.4}, False),
+    ],
+)
+def test_a_virtual_sensor_gives_its_sensitivity_in_one_of_two_ways(given, fits):
+    table = read(SPECIMENS / "magnet-beam.toml")
+    first = next(iter(table["sensors"]))
+    table["sensors"][0] = {key: v for key, v in first.items() if key != "sensitivity_v_per_unit"} | given
+    assert of("rig").is_valid(table) == fits
+
+
+@pytest.mark.parametrize(
     ("stinger", "fits"),
     [
         ({"diameter_m": 0.002, "length_m": 0.1, "material": "steel"}, True),
