@@ -18,7 +18,7 @@ from rig.recording.tables import StoredTexts, write_object, write_table
 if TYPE_CHECKING:
     import h5py
 
-_CHECKED = {"fletcher32": True}
+_CHECKED: dict[str, str | bool] = {"fletcher32": True}
 _TAKEN_OVER = "taken over from an unverified file"
 
 

@@ -3,22 +3,25 @@
 import re
 from datetime import date
 
-_CLOCK = re.compile(
-    r"(?<![\d:.,])(?:(\d{4})-(\d\d)-(\d\d)[T ])?"
-    r"(?:(\d{1,2}):([0-5]\d):([0-5]\d)|(\d{1,3}):([0-5]\d)(?=[.,]\d))([.,]\d+)?Z?(?![\d:])"
-)
-"""Hours, minutes and seconds, with or without a date of ISO 8601; or minutes and seconds with a fraction."""
+_CLOCKS = {
+    decimal: re.compile(
+        r"(?<![\d:])(?:(\d{4})-(\d\d)-(\d\d)[T ])?"
+        rf"(?:(\d{{1,2}}):([0-5]\d):([0-5]\d)|(\d{{1,3}}):([0-5]\d)(?=[{decimal}]\d))([{decimal}]\d+)?Z?(?![\d:])"
+    )
+    for decimal in ".,"
+}
+"""Hours, minutes and seconds, with or without a date of ISO 8601; or minutes and seconds with a fraction; by decimal sign."""
 _EPOCH = date(1970, 1, 1).toordinal()
 
 
-def is_clock(text: str) -> bool:
+def is_clock(cell: str) -> bool:
     """Return whether a cell is a time of day."""
-    return _CLOCK.fullmatch(text.strip().strip('"')) is not None
+    return any(clock.fullmatch(cell.strip().strip('"')) for clock in _CLOCKS.values())
 
 
 def in_seconds(text: str, decimal: str) -> str:
     """Return a text with all times of day in seconds: since midnight, or since 1970 where they have a date."""
-    return _CLOCK.sub(lambda found: _seconds(found, decimal), text)
+    return _CLOCKS[decimal].sub(lambda found: _seconds(found, decimal), text)
 
 
 def _seconds(found: re.Match[str], decimal: str) -> str:

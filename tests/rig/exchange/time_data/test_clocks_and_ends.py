@@ -56,6 +56,7 @@ def test_what_is_no_time_of_day_stays_as_it_is():
     assert not any(map(is_clock, ("12:30", "1:2:3", "25:61:00", "a:b:c", "12:00:00:00", "1.5", "2026-03-01")))
     assert in_seconds("2026-02-30 10:00:00.5,1.25", ".") == "2026-02-30 10:00:00.5,1.25"
     assert in_seconds("00:00:01,5;2,5", ",") == "1,5;2,5"
+    assert in_seconds("5,00:01:00,0:00:01.5,7:08", ".") == "5,60.0,1.5,7:08"
 
 
 def test_lines_of_numbers_at_the_end_are_told_by_the_instants(tmp_path):

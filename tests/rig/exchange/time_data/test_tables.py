@@ -138,6 +138,7 @@ def test_columns_of_texts_are_told_and_do_not_stand_in_the_way(tmp_path):
     (tmp_path / "x.csv").write_text("clock,a,b,state\n12:00:01,1,2,OK\n12:00:02,3,4,OK\n12:00:03,5,6,late\n")
     found = read_table(tmp_path / "x.csv", guessed_layout(tmp_path / "x.csv"))
     np.testing.assert_array_equal(found.values["b"], [2.0, 4.0, 6.0])
+    np.testing.assert_array_equal(found.values["clock"], [43201.0, 43202.0, 43203.0])
     assert found.values["state"] == "<texts such as 'OK'>"
 
 
