@@ -197,7 +197,7 @@ def _from_uff(path: Path, units: str, drive: str, item: int) -> "Measurement":
     from rig.exchange.universal_file import FREQUENCY_RESPONSE, TIME_RESPONSE
 
     file = read_uff(path)
-    modes, responses = file.has_shapes, bool(file.of_type(FREQUENCY_RESPONSE))
+    modes, responses = file.shapes > 0, bool(file.of_type(FREQUENCY_RESPONSE))
     if modes and responses and not item:
         raise ImportFailed(f"{path}: holds modes and frequency responses; choose by `item` 1 (modes) or 2 (responses)")
     if modes and item in (0, 1):

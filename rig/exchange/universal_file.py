@@ -86,12 +86,12 @@ class UnitSystem:
 class UniversalFile:
     """Functions, normal modes and systems of units of a universal file, in their order.
 
-    ``has_shapes`` says whether there are shapes (dataset 55) of any analysis type, ``count`` is the number of all datasets.
+    ``shapes`` is the number of shapes (dataset 55) of any analysis type, ``count`` that of all datasets.
     """
 
     functions: tuple[Function, ...]
     modes: tuple[ModeShape, ...]
-    has_shapes: bool
+    shapes: int
     units: tuple[UnitSystem, ...]
     count: int
 

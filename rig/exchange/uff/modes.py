@@ -42,6 +42,8 @@ def modes_in(file: UniversalFile, assumed: str = "", drive: str = "") -> LinearM
     shapes = shapes / np.sqrt([mode.modal_mass * to_kg for mode in modes])
     row = next(index for index, channel in enumerate(channels) if channel.role == "drive")
     shapes = shapes * np.where(shapes[row] < 0.0, -1.0, 1.0)
+    others = file.shapes - len(modes)
+    left_out = (f"left out of the universal file: shapes that are no normal modes ({others})",) if others else ()
     unknown, nothing = np.full(len(modes), np.nan), np.zeros(len(channels), dtype=np.complex128)
     frequency_hz = np.array([mode.frequency_hz for mode in modes])
     return LinearModes(
@@ -58,7 +60,7 @@ def modes_in(file: UniversalFile, assumed: str = "", drive: str = "") -> LinearM
         lowest_hz=float(frequency_hz[0]),
         highest_hz=float(frequency_hz[-1]),
         specimen="" if first.lines[1] == "NONE" else first.lines[1],
-        notes=("from a universal file: six digits, without residual terms and standard errors",),
+        notes=(*left_out, "from a universal file: six digits, without residual terms and standard errors"),
     )
 
 

@@ -50,7 +50,7 @@ def datasets_in(path: Path) -> UniversalFile:
     return UniversalFile(
         functions=tuple(one for one in found if isinstance(one, Function)),
         modes=tuple(one for one in found if isinstance(one, ModeShape)),
-        has_shapes=55 in types,
+        shapes=types.count(55),
         units=tuple(one for one in found if isinstance(one, UnitSystem)),
         count=len(found),
     )

@@ -259,6 +259,14 @@ def test_modes_of_others_are_normalised_by_their_modal_mass_and_positive_at_the_
     np.testing.assert_array_equal(found.frequency_hz, [10.0, 20.0])
 
 
+def test_complex_modes_beside_normal_ones_are_left_out_with_a_note(tmp_path):
+    poles = {"analysis_type": 3, "eig": -1.0 + 126.0j, "modal_a": 1.0 + 0.0j, "modal_b": 1.0 + 0.0j, "spec_data_type": 5}
+    columns = {name: np.array([1.0 + 0.5j, 0.5]) for name in ("r1", "r2", "r3")}
+    found = import_file(written(tmp_path / "both.uff", units(), mode(), mode(**poles, **columns)), drive="1+Z")
+    np.testing.assert_array_equal(found.frequency_hz, [20.0])
+    assert found.notes[0] == "left out of the universal file: shapes that are no normal modes (1)"
+
+
 def test_a_modal_mass_in_other_units_is_converted(tmp_path):
     path = written(tmp_path / "modes.uff", units(5, length=1000.0, force=1000.0), mode())  # mm, mN: kg
     assert abs(import_file(path, drive="1+Z").drive_shape[0]) == pytest.approx(1.0)
