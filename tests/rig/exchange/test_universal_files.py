@@ -260,7 +260,13 @@ def test_modes_of_others_are_normalised_by_their_modal_mass_and_positive_at_the_
 
 
 def test_complex_modes_beside_normal_ones_are_left_out_with_a_note(tmp_path):
-    poles = {"analysis_type": 3, "eig": -1.0 + 126.0j, "modal_a": 1.0 + 0.0j, "modal_b": 1.0 + 0.0j, "spec_data_type": 5}
+    poles = {
+        "analysis_type": 3,
+        "eig": -1.0 + 126.0j,
+        "modal_a": 1.0 + 0.0j,
+        "modal_b": 1.0 + 0.0j,
+        "spec_data_type": 5,
+    }
     columns = {name: np.array([1.0 + 0.5j, 0.5]) for name in ("r1", "r2", "r3")}
     found = import_file(written(tmp_path / "both.uff", units(), mode(), mode(**poles, **columns)), drive="1+Z")
     np.testing.assert_array_equal(found.frequency_hz, [20.0])
