@@ -119,8 +119,8 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
     )
 
 
-def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the reasons against arming for ``what``.
+def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[str, str] | None) -> tuple[str, ...]:
+    """Return the reasons against arming for ``what``; those that depend on the device only with its ``identity``.
 
     Reasons are limits that do not fit the sensors, a missing check, or a check that does not count. For a check itself there
     are none: it moves the rig gently, and finds such faults.
@@ -138,7 +138,7 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[
         out.append(f"the last check lies {-age_h:.1f} h ahead of the clock of this computer, so its age is not known")
     if age_h > bench.arming.check_valid_h:
         out.append(f"the last check is {age_h:.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
-    if check.fingerprint != fingerprint(bench, identity):
+    if identity is not None and check.fingerprint != fingerprint(bench, identity):
         out.append("the last check was of other channels, another rate, another driver or another device")
     return tuple(out)
 

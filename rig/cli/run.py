@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import Json, Output, plan_and_bench
+from rig.cli.options import Json, plan_and_bench
 from rig.cli.run_options import of_a_further_part, of_a_recording, shown, with_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
+    from rig.bench import Bench
+    from rig.campaigns.planning.plan import Plan
     from rig.recording.reader import Recording
 
 Rehearsed = Annotated[Path | None, typer.Option(help="Rehearsal of the plan on this bench, for arming and the record.")]
@@ -25,21 +27,32 @@ Override = Annotated[
 def run(
     *,
     plan: Annotated[str, typer.Argument(help="Shipped plan (magnet-beam/backbone) or TOML file.")],
-    output: Output,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Recording to write; not needed with --dry-run.")
+    ] = None,
     bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
     daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
     check: Check = None,
     rehearsal: Rehearsed = None,
     override_rehearsal: Override = "",
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what the run would do and take, and what arms it; drive nothing.")
+    ] = False,
     options: "RunOptions",
     json: Json = False,
 ) -> None:
     """Carry out a plan and record it."""
     from rig.campaigns.running.runner import run_plan
+    from rig.errors import ConfigurationError
 
+    if output is None and not dry_run:
+        raise ConfigurationError("a file is wanted", field="output")
     loaded, chosen = plan_and_bench(plan, bench)
     if daq is not None:
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
+    if output is None or dry_run:
+        _say_what_would_be_done(loaded, chosen, output or Path("recording.h5"), json)
+        return
     if check is not None:
         from rig.check.assessment import checked_scale
 
@@ -121,6 +134,19 @@ def _carry(
         say_how_it_ended(summary, path, _pure_plan(source))
     if not complete:
         raise typer.Exit(1)
+
+
+def _say_what_would_be_done(plan: "Plan", bench: "Bench", output: Path, json: bool) -> None:
+    from rig.campaigns.running.dry_run import dry_run
+    from rig.text.console import print_json
+    from vibrolock.printable import printable
+
+    found = dry_run(plan, bench, output)
+    if json:
+        print_json(found.to_json())
+        return
+    for line in found.lines():
+        print(printable(line))
 
 
 def _pure_plan(source: str) -> str:

@@ -6,6 +6,7 @@ from rig.live.facts import Line, RunFacts, number_in, text_in
 from rig.monitor.shown import Shown
 from rig.text.column import Column
 from rig.text.console import number
+from rig.text.durations import duration
 from rig.text.levels import in_shown_unit
 from vibrolock.printable import one_line, printable
 
@@ -16,17 +17,6 @@ CLOSE = 0.8
 def figure(value: float, pattern: str) -> str:
     """Return a number in a format, or a dash if it is not known."""
     return format(value, pattern) if math.isfinite(value) else "-"
-
-
-def duration(seconds: float) -> str:
-    """Return a time as people say it: ``12 s``, ``3 min 20 s``, ``2 h 5 min``; a question mark if it is not known."""
-    if not math.isfinite(seconds):
-        return "? s"
-    whole = max(0, round(seconds))
-    if whole < 100:
-        return f"{whole} s"
-    minutes, rest = divmod(whole, 60)
-    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def share_word(share: float) -> str:

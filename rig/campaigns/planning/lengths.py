@@ -31,7 +31,7 @@ def check_length(plan: Plan, bench: Bench) -> None:
     """Raise `ConfigurationError`, naming the keys, for a record beyond `MOST_ROWS` or a plan beyond `LONGEST_DAYS`."""
     took: dict[SegmentKind, float] = defaultdict(float)
     for segment in plan.segments(bench.sample_rate_hz):
-        duration_s = _duration_s(plan, bench, segment)
+        duration_s = duration_of(plan, segment, _lowest_hz(plan, bench))
         took[segment.kind] += duration_s
         rows = duration_s * bench.sample_rate_hz
         if rows > MOST_ROWS and segment.kind in EVALUATED:
@@ -50,18 +50,22 @@ def check_length(plan: Plan, bench: Bench) -> None:
         )
 
 
-def _duration_s(plan: Plan, bench: Bench, segment: Segment) -> float:
-    """Longest possible duration of a segment, at the lowest frequency that it may have, s."""
+def duration_of(plan: Plan, segment: Segment, frequency_hz: float, periods: float | None = None) -> float:
+    """Return the duration of a segment, s. ``frequency_hz`` is that of periods that no tone gives.
+
+    ``periods`` is the number of its periods, by default the largest that it may have.
+    """
     if segment.kind is SegmentKind.SWEEP:
         return plan.sweep_s
     if segment.duration_s is not None:
         return segment.duration_s
-    lowest_hz = bench.limits.frequency_hz[0]
-    if segment.excitation is not None:
-        lowest_hz = segment.excitation.frequency_hz
-    elif isinstance(plan, LockedPlan):
-        lowest_hz = plan.controller.frequency_window_hz[0]
-    return segment.periods / lowest_hz
+    tone = segment.excitation
+    return (segment.periods if periods is None else periods) / (frequency_hz if tone is None else tone.frequency_hz)
+
+
+def _lowest_hz(plan: Plan, bench: Bench) -> float:
+    """Return the lowest frequency that a loop may have, Hz."""
+    return plan.controller.frequency_window_hz[0] if isinstance(plan, LockedPlan) else bench.limits.frequency_hz[0]
 
 
 def _keys(plan: Plan, kind: SegmentKind) -> str:
