@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.analysis.plausible_sizes import implausible_sizes
 from rig.bench import Bench, load_bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
@@ -61,7 +62,8 @@ class Subject:
         """Remarks that apply to every analysis of this bench."""
         scatter = ("the specimen scatters from run to run or by assembly; this is the nominal one, without scatter",)
         wear = ("the specimen wears within a run; this is the one that a run begins with",)
-        return (*(scatter if self.rig.scatters else ()), *(wear if self.rig.wear.wears else ()), *self.remarks)
+        sizes = implausible_sizes(self.rig, self.frequency_hz, self.bench.sample_rate_hz)
+        return (*(scatter if self.rig.scatters else ()), *(wear if self.rig.wear.wears else ()), *sizes, *self.remarks)
 
     def limited_quantities(self, responses: PeriodicResponses) -> list[LimitedQuantity]:
         """Return the limited quantities at the points, with their limits."""

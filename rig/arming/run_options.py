@@ -44,14 +44,17 @@ class Silent:
 
 
 class RemarksOnce:
-    """Passes the events of several runs on to one display, each remark the first time only."""
+    """Passes the events of several runs on to one display: each remark the first time only, points without their total.
+
+    What is still to come is not known, for each run decides on the next.
+    """
 
     def __init__(self, display: Progress) -> None:
         self._display, self._known = display, set[str]()
 
     def point(self, point: Any, number: int, total: int) -> None:
         """Pass it on."""
-        self._display.point(point, number, total)
+        self._display.point(point, number, 0)
 
     def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
         """Pass it on."""

@@ -20,8 +20,8 @@ LEAST_REMAINDER = 1e-3
 """What is left of 1 less the product of two tangents near a quarter turn, which no single high-pass reaches; chosen."""
 DATE = r"^(\d{4}-\d{2}-\d{2})?$"
 """Pattern of a day, or of no day."""
-SAME = 1e-9
-"""Relative difference up to which two sensitivities are one; chosen: far above rounding, far below any calibration."""
+SAME_SENSITIVITY = 1e-5
+"""Relative difference up to which two sensitivities are one. Chosen: above rounding to six digits, below any calibration."""
 NEGLIGIBLE_BITS = 0.1
 """Amplitude of a harmonic of the force, in steps of the converter, that counts as none. Chosen: below the noise."""
 
@@ -140,7 +140,7 @@ class Channel(Configured):
             )
         volts = -volts if inverted is True else volts
         given = table.get("sensitivity_v_per_unit", volts)
-        if isinstance(given, float) and not math.isclose(given, volts, rel_tol=SAME):
+        if isinstance(given, float) and not math.isclose(given, volts, rel_tol=SAME_SENSITIVITY):
             raise InputError(
                 f"sensitivity = {sheet!r} makes it {volts:.6g}",
                 field="sensitivity_v_per_unit",

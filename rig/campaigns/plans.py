@@ -27,6 +27,15 @@ def shipped_plans() -> list[str]:
 def load_plan(name_or_path: str | Path) -> Plan:
     """Load a shipped plan by name, or a plan from a TOML file; raise `ConfigurationError` that names the error in it."""
     text = str(name_or_path)
+    if Path(text).suffix == ".h5":
+        raise ConfigurationError(
+            "is a file of results, which a plan makes",
+            field="plan",
+            value=text,
+            allowed="the name of a plan or a .toml file",
+            hint="a recording is shown by rig show, rig plot and rig replay, finished by rig resume, and made into a model by "
+            "rig identify",
+        )
     return plan_from(read_toml(find_toml(name_or_path, _folder(), "plan")), text)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification import IdentificationError
 from rig.arming.checked_scale import CheckedScale
@@ -19,6 +20,7 @@ from rig.campaigns.plans import plan_from
 from rig.check.findings import Finding, Verdict, is_check, not_tested
 from rig.check.judging import driven_findings, latency_findings
 from rig.check.reference import reference_findings
+from rig.check.resolution import resolution_findings
 from rig.check.responses import Mode, Responses, responses_of, scale_of
 from rig.check.silence import silent_findings
 from rig.errors import RecordingError
@@ -95,6 +97,8 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
         text = "no reference was given: drive polarity, volts to newtons and slow changes are not seen"
         findings.append(not_tested("reference", text))
     level = plan.levels_rms_v[-1] if found is not None else None
+    if level is not None:
+        findings += resolution_findings(bench, level, _driven_rows(recording))
     findings += _clipping(recording, bench, level)
     return Assessment(bench, recording.path, recording.started, level, tuple(findings), found, mode, old)
 
@@ -154,12 +158,16 @@ def responses_in(recording: Recording) -> Responses | None:
     points = [point for point in points_of(recording) if point.rows is not None]
     if not points or points[-1].rows is None:
         return None
-    part = recording.parts[-1]
-    rows = part.read(points[-1].rows.first_sample, points[-1].rows.end_sample)
     try:
-        return responses_of(bench, spectra_of(bench, plan, {points[-1].realisation or 0: rows}))
+        return responses_of(bench, spectra_of(bench, plan, {points[-1].realisation or 0: _driven_rows(recording)}))
     except IdentificationError:
         return None
+
+
+def _driven_rows(recording: Recording) -> NDArray[np.void]:
+    """Return the rows of the last multisine, which was played to its end."""
+    rows = next(point.rows for point in reversed(points_of(recording)) if point.rows is not None)
+    return recording.parts[-1].read(rows.first_sample, rows.end_sample)
 
 
 def _plan(recording: Recording) -> MultisinePlan:

@@ -33,11 +33,13 @@ def check(
     *,
     named: str | None = None,
     reference: str | Path | None = None,
+    level_rms_v: float | None = None,
 ) -> Assessment:
     """Check a bench, record the check in ``recording``, and remember the result for arming unless the rig is virtual.
 
-    ``named`` is the name of the bench in the recorded plan. ``reference`` is the recording of an earlier check. A check moves
-    the rig, gently, so it must be armed like a campaign.
+    ``named`` is the name of the bench in the recorded plan. ``reference`` is the recording of an earlier check of this bench.
+    ``level_rms_v``: RMS voltage of the multisine, by default found by itself. A check moves the rig, gently, so it must be
+    armed like a campaign.
 
     Raises `rig.errors.ConfigurationError`, `rig.errors.RecordingError`, `rig.errors.DaqError` or `rig.errors.NotArmed` if
     nothing could be checked. Faults of the rig are findings, not errors.
@@ -49,7 +51,7 @@ def check(
         if Path(reference).exists() and path.exists() and path.samefile(reference):
             raise RecordingError(f"{path}: is the reference that is read; choose another name")
         with Recording(reference) as known:
-            responses_in(known)  # refuses a recording that is no check before anything moves
+            _refuse_another_bench(known, bench)
     series = MultisineSeries(bench, path, options or RunOptions(), PURPOSE)
     silent_s = SILENT_S
 
@@ -59,8 +61,19 @@ def check(
         with series.play(plan) as recorded:
             return seen_in(bench, recorded)
 
-    SEARCH.search(bench, listen)
+    if level_rms_v is None:
+        SEARCH.search(bench, listen)
+    else:
+        listen(level_rms_v)
     return _assessed(bench, path, reference)
+
+
+def _refuse_another_bench(reference: Recording, bench: Bench) -> None:
+    """Refuse, before anything moves, a reference that is no check, or is one of another bench."""
+    responses_in(reference)
+    name = reference.configuration["bench"]["name"]
+    if name != bench.name:
+        raise RecordingError(f"{reference.path}: is a check of the bench {name}, not of {bench.name}")
 
 
 def _assessed(bench: Bench, path: Path, reference: str | Path | None) -> Assessment:

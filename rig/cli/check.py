@@ -21,6 +21,10 @@ def check_(
         Path | None, typer.Option("-o", "--output", help="Recording to write; named by bench and time if left out.")
     ] = None,
     reference: Annotated[Path | None, typer.Option(help="Recording of an earlier check to compare with.")] = None,
+    level_rms_v: Annotated[
+        float | None,
+        typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found by itself if left out."),
+    ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
     options: "RunOptions",
     json: Json = False,
@@ -43,7 +47,7 @@ def check_(
     if figure is not None:
         check_figure(figure, options.overwrite)
     with shown(options, MULTISINE_COLUMNS) as watched:
-        found = check(loaded, path, watched, named=bench, reference=reference)
+        found = check(loaded, path, watched, named=bench, reference=reference, level_rms_v=level_rms_v)
     if figure is not None:
         write_check(found, figure)
     facts = summary(found)

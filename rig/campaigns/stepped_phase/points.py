@@ -19,7 +19,7 @@ from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
 from rig.text.column import Column
 
 STEPPED_PHASE_COLUMNS = (
-    Column("phase_lag_deg", "phase lag", "deg", ".2f"),
+    Column("phase_lag_deg", "acceleration lag", "deg", ".2f"),
     *shared_columns("frequency_hz", "force_n"),
     Column("force_rms_n", "force RMS", "N", ".4f"),
     FINE_AMPLITUDE,

@@ -30,7 +30,7 @@ TRUSTED_NONHARMONIC_FORCE = 0.1  # in open loop a larger value warns; plans unde
 STEPPED_SINE_COLUMNS = (
     *shared_columns("frequency_hz", "force_n"),
     FINE_AMPLITUDE,
-    Column("phase_lag_deg", "phase lag", "deg", ".2f"),
+    Column("phase_lag_deg", "displacement lag", "deg", ".2f"),
     *PURITY_COLUMNS,
 )
 

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from rig.bench import Bench
+from rig.bench.channels import SAME_SENSITIVITY
 from rig.bench.configuration import Configured, invalid, validated
 from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, Outputs, PassingFaults, held_outputs
@@ -163,10 +164,11 @@ class VirtualDAQ(DAQ):
             )
         delays = self.rig.channel_delays_samples
         for channel, sensor, delay in zip(self.channels[: delays.size], self.rig.sensors, delays, strict=True):
-            if channel.sensitivity_v_per_unit != sensor.sensitivity_v_per_unit:
+            said, has = channel.sensitivity_v_per_unit, sensor.sensitivity_v_per_unit
+            if not math.isclose(said, has, rel_tol=SAME_SENSITIVITY):
                 out.append(
-                    f"channel {channel.name}: the bench says {channel.sensitivity_v_per_unit:g} V per {channel.unit}, "
-                    f"the virtual sensor has {sensor.sensitivity_v_per_unit:g}"
+                    f"channel {channel.name}: the bench says {said:.8g} V per {channel.unit}, "
+                    f"the virtual sensor has {has:.8g}"
                 )
             if abs(channel.skew_samples - delay) > SKEW_TOLERANCE:
                 out.append(

@@ -37,7 +37,7 @@ def _say(summary: dict[str, Any]) -> None:
         Column("damping_ratio", "damping", "%", ".4f", 100.0),
         Column("damping_ratio_bound_95", "+-", "", ".4f", 100.0),
         Column("damping_ratio_total_power", "all harmonics", "%", ".4f", 100.0),
-        Column("phase_lag_deg", "phase lag", "deg", ".2f"),
+        Column("phase_lag_deg", "displacement lag", "deg", ".2f"),
     )
     print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
     if summary["drive_mode_shape"] is not None:

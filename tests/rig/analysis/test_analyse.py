@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +14,11 @@ from rig.analysis.forced import forced
 from rig.analysis.levels import level_range
 from rig.analysis.linear_responses import responses
 from rig.analysis.modes import modes
+from rig.analysis.plausible_sizes import implausible_sizes
 from rig.analysis.subject import peak, subject_of
 from rig.errors import ConfigurationError
 from simulators.analysis import NotConvergedError, phase_resonance_backbone
+from simulators.structures.structure import BeamStructure
 from tests.reference.harmonic_balance import backbone as reference_backbone, response_to_voltage
 from tests.reference.parameters import ONE_SIDED
 from tests.rig.rigs import bench_with
@@ -199,6 +202,25 @@ def test_the_specimen_that_scatters_is_analysed_as_the_nominal_one_and_that_is_s
     assert found.structure.frequency_hz[0] == pytest.approx(24.37, abs=1e-3)
     assert any("nominal" in note for note in found.summary()["notes"])
     assert not modes(subject_of("magnet-beam")).summary()["notes"]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "said"),
+    [
+        ({"length_m": 300.0}, ["less than 1 Hz", "thickness_m = 0.008 is 2.67e-05 of length_m = 300"]),
+        ({"thickness_m": 8.0}, ["more than half of sample_rate_hz = 5000", "thickness_m = 8 is 16 of length_m = 0.5"]),
+        ({}, []),
+    ],
+)
+def test_sizes_in_another_unit_are_told(sizes, said):
+    beam = {"kind": "beam", "length_m": 0.5, "width_m": 0.04, "thickness_m": 0.008, "youngs_modulus_pa": 2.1e11}
+    beam |= {"density_kg_m3": 7850.0, "damping_ratio": [0.002], "points_m": {}, **sizes}
+    structure = BeamStructure.model_validate(beam)
+    waves = np.sqrt(structure.youngs_modulus_pa / (12.0 * structure.density_kg_m3))
+    frequency_hz = 1.8751**2 / (2.0 * np.pi) * structure.thickness_m * waves / structure.length_m**2  # clamped-free
+    notes = implausible_sizes(SimpleNamespace(structure=structure), frequency_hz, 5000.0)
+    assert len(notes) == len(said)
+    assert all(text in note for text, note in zip(said, notes, strict=True))
 
 
 def test_another_mode_is_followed_where_one_asks_for_it():

@@ -8,6 +8,7 @@ import pytest
 from rig.arming.run_options import RunOptions
 from rig.check.findings import Finding
 from rig.check.report import print_summary, summary
+from rig.check.resolution import resolution_findings
 from rig.check.run import check
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
@@ -153,6 +154,40 @@ def test_only_the_recording_of_a_check_is_a_reference(tmp_path):
     with refused(RecordingError, "other"):
         check(bench_with(BLOCK), tmp_path / "check.h5", reference=tmp_path / "other.h5")
     assert not (tmp_path / "check.h5").exists()
+
+
+def test_a_reference_of_another_bench_is_refused_before_anything_moves(tmp_path, sound):
+    with refused(RecordingError, "is-a-check-of-the-bench"):
+        check("friction-beam", tmp_path / "check.h5", reference=sound.recording)
+    assert not (tmp_path / "check.h5").exists()
+
+
+def test_a_level_is_played_alone_and_below_one_step_it_is_said_what_would_do(tmp_path):
+    bench = bench_with({**BLOCK, "output_resolution_v": 0.004})
+    found = check(bench, tmp_path / "check.h5", level_rms_v=0.002)
+    assert found.level_rms_v == 0.002
+    with Recording(found.recording) as recording:
+        assert len(recording.parts) == 1
+    said = finding(found, "resolution", "")
+    assert said.value == pytest.approx(0.5)
+    assert "--level 0.016, 3 more bits, or 8 times less gain" in said.text
+    assert not [f for f in check(bench_with(BLOCK), tmp_path / "fine.h5").findings if f.name == "resolution"]
+
+
+@pytest.mark.parametrize(
+    ("rms_steps", "said"), [(0.5, "8 times the gain of its conditioner, 3 more bits"), (0.1, "hardly shows")]
+)
+def test_a_channel_below_one_step_is_told_by_how_much_gain_or_how_many_bits_would_do(rms_steps, said):
+    bench = bench_with()
+    rows = np.zeros(1000, [("inputs", "f4", len(bench.channels))])
+    wave = np.sqrt(2.0) * np.sin(2.0 * np.pi * np.arange(1000) / 100.0)
+    for index, channel in enumerate(bench.channels):
+        steps = rms_steps if channel.role == "force" else 50.0
+        rows["inputs"][:, index] = wave * np.hypot(steps * channel.resolution_in_unit, channel.noise_rms)
+    (found,) = resolution_findings(bench, 1.0, rows)
+    assert (found.channel, found.verdict) == ("force", "warn")
+    assert found.value == pytest.approx(rms_steps, rel=1e-3)
+    assert said in found.text
 
 
 def test_the_table_names_what_to_do(tmp_path, monkeypatch, capsys):
