@@ -9,7 +9,8 @@ from rig.arming.run_options import RunOptions
 from rig.bench import Bench, load_bench
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, Seen, share_of_limits
+from rig.campaigns.planning.lengths import duration_of
+from rig.campaigns.running.level_search import FIRST, LevelSearch, MultisineSeries, Seen, share_of_limits
 from rig.check.assessment import Assessment, assess, responses_in
 from rig.check.findings import PURPOSE
 from rig.errors import ConfigurationError, RecordingError
@@ -66,6 +67,14 @@ def check(
     else:
         listen(level_rms_v)
     return _assessed(bench, path, reference)
+
+
+def expected_duration_s(bench: Bench, level_rms_v: float | None = None) -> tuple[float, float]:
+    """Return how long a check takes at least and at most, s: silence, then the multisine at one level or at several."""
+    plan = _plan(bench, bench.name, FIRST * bench.limits.voltage_v if level_rms_v is None else level_rms_v, 0.0)
+    segments = plan.segments(bench.sample_rate_hz)
+    one_s = sum(duration_of(plan, segment, bench.specimen.linear_frequency_hz) for segment in segments)
+    return SILENT_S + one_s, SILENT_S + (SEARCH.most_levels if level_rms_v is None else 1) * one_s
 
 
 def _refuse_another_bench(reference: Recording, bench: Bench) -> None:

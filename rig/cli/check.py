@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.options import Json, keep_existing
-from rig.cli.run_options import of_a_recording, shown, with_options
+from rig.cli.run_options import by_the_clock, of_a_recording, shown, with_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
@@ -34,9 +34,11 @@ def check_(
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
     from rig.check.figure import write_check
     from rig.check.report import print_summary, summary
-    from rig.check.run import check
+    from rig.check.run import check, expected_duration_s
     from rig.errors import ConfigurationError
+    from rig.show.waiting import Waiting
     from rig.text.console import print_json
+    from rig.text.durations import duration
     from rig.tuning.figure import check_figure
 
     loaded = load_bench(bench)
@@ -46,7 +48,10 @@ def check_(
     keep_existing([] if reference is None else [reference], path, options.overwrite)
     if figure is not None:
         check_figure(figure, options.overwrite)
-    with shown(options, MULTISINE_COLUMNS) as watched:
+    least_s, most_s = expected_duration_s(loaded, level_rms_v)
+    usual = f"{duration(least_s)}" + (f", up to {duration(most_s)} if the level must rise" if most_s > least_s else "")
+    what = f"checking {loaded.name}: silence, then a low-level multisine"
+    with Waiting(what, usual if by_the_clock(loaded, options) else ""), shown(options, MULTISINE_COLUMNS) as watched:
         found = check(loaded, path, watched, named=bench, reference=reference, level_rms_v=level_rms_v)
     if figure is not None:
         write_check(found, figure)

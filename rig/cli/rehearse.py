@@ -1,6 +1,7 @@
 """``rig rehearse``: a plan on many virtual twins of a bench, before anything moves."""
 
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -97,6 +98,7 @@ def _rehearse(
     from rig.figures.files import plot
     from rig.rehearsal.report import lines, summary
     from rig.results.rehearsal.rehearse import improve_into, rehearse_into, request_for
+    from rig.show.waiting import Waiting
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure
     from vibrolock.printable import printable
@@ -115,7 +117,8 @@ def _rehearse(
         keep_existing([], improve.with_suffix(".h5"), overwrite)
     if figure is not None:
         check_figure(figure, overwrite)
-    request = request_for(subject)
+    with Waiting("learning what is known of the rig"):
+        request = request_for(subject)
     with Rehearsing(subject.draws) as listener:
         found = rehearse_into(request, output, overwrite=overwrite, listener=listener, jobs=jobs)
     second = None
@@ -151,28 +154,48 @@ class Rehearsing:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+        from rig.show.waiting import Waiting
+
         self.total, self.bad = total, 0
         self.terminal = sys.stderr.isatty()
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self.waiting = Waiting(
+            f"rehearsing on {total} twins",
+            "the first draws after some 20 s, usually one to five minutes in all",
+            announced=True,
+        )
+        self.began_s = self.first_s = time.monotonic()
         self.bar = Progress(*columns, console=Console(stderr=True), disable=not self.terminal)
         self.task = self.bar.add_task("rehearsing", total=total)
 
     def __enter__(self) -> "Listener":
         from rig.results.rehearsal.rehearse import Listener
 
+        self.waiting.__enter__()
         self.bar.start()
         return Listener(self.draw, self.effect)
 
     def __exit__(self, *_: object) -> None:
         self.bar.stop()
+        self.waiting.__exit__(None, None, None)
 
     def draw(self, draw: "Draw", done: int) -> None:
         """Show a draw."""
+        from rig.show.waiting import heard
+        from rig.text.durations import duration
+
+        heard()
+        if done <= 1:
+            self.first_s = time.monotonic()
         self.bad += 0 if draw.trial.completed else 1
         text = f"rehearsing, {done - self.bad} well" if done >= self.bad else "rehearsing"
         self.bar.update(self.task, completed=done, description=text)
         if not self.terminal and (done % max(1, self.total // 10) == 0 or done == self.total):
-            print(f"{done} of {self.total} draws, {self.bad} did not end well", file=sys.stderr, flush=True)
+            now_s = time.monotonic()
+            left_s = (now_s - self.first_s) / max(done - 1, 1) * (self.total - done)
+            left = f", about {duration(left_s)} left" if 1 < done < self.total else ""
+            line = f"[{now_s - self.began_s:.0f} s] {done} of {self.total} draws, {self.bad} did not end well{left}"
+            print(line, file=sys.stderr, flush=True)
 
     def effect(self, effect: "Effect") -> None:
         """Show a remedy that was tried."""

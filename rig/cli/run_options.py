@@ -16,6 +16,7 @@ from rig.cli.options import Overwrite, with_parameters
 if TYPE_CHECKING:
     from rig.arming.arming import Arm, ArmingRequest
     from rig.arming.run_options import RunOptions
+    from rig.bench import Bench
     from rig.text.column import Column
 
 Seed = Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)]
@@ -105,6 +106,11 @@ def shown(options: "RunOptions", columns: "Sequence[Column]") -> "Iterator[RunOp
         progress.close()
 
 
+def by_the_clock(bench: "Bench", options: "RunOptions") -> bool:
+    """Whether a run waits for the wall clock: on every rig but a virtual one that is not held back."""
+    return bench.driver.name != "virtual" or options.realtime
+
+
 def _arm_from(arm: bool) -> "Arm":
     """Return True if the switch was given; otherwise a function that asks on the terminal, or None without a terminal."""
     if arm:
@@ -119,14 +125,16 @@ def on_a_terminal() -> bool:
 
 def ask(request: "ArmingRequest") -> bool:
     """Show what is going to move; return whether the bench's name was typed."""
+    from rig.show.waiting import silence
     from vibrolock.printable import printable
 
-    for line in request.lines():
-        print(printable(line), file=sys.stderr)
-    print(
-        f"{printable(request.what)} will move this rig. Type the bench's name to arm it: ",
-        end="",
-        file=sys.stderr,
-        flush=True,
-    )
-    return sys.stdin.readline().strip() == request.bench.name
+    with silence():
+        for line in request.lines():
+            print(printable(line), file=sys.stderr)
+        print(
+            f"{printable(request.what)} will move this rig. Type the bench's name to arm it: ",
+            end="",
+            file=sys.stderr,
+            flush=True,
+        )
+        return sys.stdin.readline().strip() == request.bench.name

@@ -50,6 +50,7 @@ def tune_(
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
     from rig.errors import ConfigurationError
     from rig.rehearsal.report import verdict_in_one_line
+    from rig.show.waiting import Waiting
     from rig.system.whole_file import whole_file
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure, draw_tuning
@@ -57,7 +58,7 @@ def tune_(
     from rig.tuning.tuning import TuningRequest, tune
     from vibrolock.printable import printable
 
-    load_bench(bench)
+    loaded = load_bench(bench)
     request = TuningRequest(
         level_rms_v=level_rms_v, law=law, from_m=from_m, to_m=to_m, points=points, harmonics=harmonics
     )
@@ -72,7 +73,9 @@ def tune_(
         keep_existing([], rehearsed, options.overwrite)
     if figure is not None:
         check_figure(figure, options.overwrite)
-    with shown(options, MULTISINE_COLUMNS) as watched:
+    what = f"tuning {loaded.name}: a low-level multisine, then the gains"
+    usual = "usually one to two minutes" + (", then a rehearsal of about as long" if rehearse else "")
+    with Waiting(what, usual), shown(options, MULTISINE_COLUMNS) as watched:
         found = tune(bench, recorded, request, watched, named=_as_seen_from(bench, output))
     with whole_file(output) as part:
         part.write_text(found.plan_toml, encoding="utf-8")
@@ -95,10 +98,12 @@ def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, dr
     from rig.cli.rehearse import Rehearsing
     from rig.rehearsal.report import summary, verdict_in_one_line
     from rig.results.rehearsal.rehearse import Subject, rehearse_into, request_for
+    from rig.show.waiting import Waiting
     from rig.system.whole_file import whole_file
 
     subject = Subject(plan=found.plan, bench=found.bench, sources=[recording], draws=draws)
-    request = request_for(subject)
+    with Waiting("learning what is known of the rig"):
+        request = request_for(subject)
     with Rehearsing(draws) as listener:
         facts = summary(rehearse_into(request, rehearsed, overwrite=True, listener=listener, jobs=-1))
     head = wrap(f"Rehearsal: {verdict_in_one_line(facts)}.", 118, initial_indent="# ", subsequent_indent="# ")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.show.point_warnings import quality_in_short
+from rig.show.waiting import heard
 from rig.text.console import number
 from rig.text.levels import level_text
 from vibrolock.printable import printable
@@ -46,11 +47,13 @@ class _StatusLine:
             self._status("")
 
     def _status(self, text: str) -> None:
+        heard()
         with contextlib.suppress(OSError):
             sys.stderr.write(f"\r\x1b[2K{text}")
             sys.stderr.flush()
 
     def _print(self, line: str) -> None:
+        heard()
         self.close()
         with contextlib.suppress(OSError):
             print(printable(line), file=sys.stderr, flush=True)

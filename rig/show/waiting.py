@@ -1,0 +1,84 @@
+"""Says on standard error what goes on while a command is silent: plain lines with the time, on a terminal and in a pipe."""
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Self
+
+from vibrolock.printable import printable
+
+FIRST_S = 1.5  # silence after which it is said what is being done; chosen: before a person wonders
+FURTHER_S = 15.0  # silence after which it is said again; chosen
+
+
+class _Silence:
+    """When something was said last, and whether nothing may be said, for a person is typing."""
+
+    since_s = 0.0
+    wanted = 0
+
+
+def heard() -> None:
+    """Note that something was shown, so that there is no silence to break."""
+    _Silence.since_s = time.monotonic()
+
+
+@contextlib.contextmanager
+def silence() -> Iterator[None]:
+    """Say nothing meanwhile, for a person is asked something."""
+    _Silence.wanted += 1
+    try:
+        yield
+    finally:
+        _Silence.wanted -= 1
+        heard()
+
+
+class Waiting:
+    """Says what a command does: after a moment, or at once if ``announced``; again after each further silence.
+
+    ``usual``: how long it takes, in words; it is said with the first line.
+    """
+
+    def __init__(self, what: str, usual: str = "", *, announced: bool = False) -> None:
+        self._what, self._usual, self._announced = what, usual, announced
+        self._began_s = time.monotonic()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="waiting", daemon=True)
+
+    def __enter__(self) -> Self:
+        heard()
+        if self._announced:
+            self._say()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def now(self, what: str, usual: str = "") -> None:
+        """Say what is done from now on."""
+        self._what, self._usual = what, usual
+        self._say()
+
+    def _watch(self) -> None:
+        longest_s = FURTHER_S if self._announced else FIRST_S
+        while not self._over.wait(0.2):
+            if not _Silence.wanted and time.monotonic() - _Silence.since_s >= longest_s:
+                self._say()
+                longest_s = FURTHER_S
+
+    def _say(self) -> None:
+        usual = f", {self._usual}" if self._usual else ""
+        self._usual = ""
+        with contextlib.suppress(OSError, ValueError):
+            clear = "\r\x1b[2K" if sys.stderr.isatty() else ""
+            line = printable(f"[{time.monotonic() - self._began_s:.0f} s] {self._what}{usual}")
+            print(f"{clear}{line}", file=sys.stderr, flush=True)
+        heard()
