@@ -111,7 +111,7 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "
     if layout.kinds is not None:
         kinds, named = layout.kinds(), told.pop("kind", None)
         if named not in kinds:
-            raise IdentificationError(f"kind is {named!r}", where=_label(kind), allowed=kinds)
+            raise IdentificationError(where=_label(kind), field="kind", value=named, allowed=kinds)
         kind = kinds[named]
     if layout.upgrade is not None:
         with _fitting(kind):

@@ -107,7 +107,7 @@ def band_around(
         highest_hz = _BAND[1] * at_hz if highest_hz is None else highest_hz
     if not 0.0 < lowest_hz < highest_hz < most_hz:
         raise IdentificationError(
-            f"band_hz: is {lowest_hz:g} to {highest_hz:g} Hz, needs to rise between 0 and {most_hz:g} Hz"
+            f"is {lowest_hz:g} to {highest_hz:g} Hz", field="band_hz", allowed=f"rising between 0 and {most_hz:g} Hz"
         )
     return float(lowest_hz), float(highest_hz)
 

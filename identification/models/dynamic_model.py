@@ -149,5 +149,5 @@ def dynamic_model(model: object) -> DynamicModel:
         return model
     name = type(model).__name__
     if name not in KINDS:
-        raise IdentificationError(f"model: is a {name}, allowed are {', '.join(KINDS)}")
+        raise IdentificationError(f"is a {name}", field="model", allowed=KINDS)
     return KINDS[name](model)

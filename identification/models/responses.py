@@ -231,7 +231,10 @@ def _request(
     force, voltage, band = given.pop("force", None), given.pop("voltage_v", None), given.pop("band_hz", (None, None))
     if force == "voltage":
         raise IdentificationError(
-            "force: is 'voltage', allowed are pure-sine, fundamental, rms; the amplitude of a voltage is `voltage_v`"
+            field="force",
+            value=force,
+            allowed=("pure-sine", "fundamental", "rms"),
+            hint="the amplitude of a voltage is `voltage_v`",
         )
     if (force_n is None) == (voltage is None):
         raise IdentificationError("force_n, voltage_v: give one of them")

@@ -11,6 +11,7 @@ from tests.contract.planted.drivers import GOOD, CloseUnseen, LateHost, PacedDAQ
 from tests.contract.planted.hosts import Late, Punctual
 from tests.contract.planted.table import BEGIN, written
 from tests.docs.pages import ROOT
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 
 BENCH = bench_with()
@@ -97,7 +98,7 @@ def test_every_test_of_the_kit_is_there_for_a_planted_fault():
 
 @pytest.mark.parametrize(("driver", "way"), [(StopUnseen, "stop"), (CloseUnseen, "close")])
 def test_what_nobody_can_see_is_unproven_and_not_passed(driver, way):
-    with pytest.raises(Unproven, match=r"voltmeter, second DAQ"):
+    with refused(Unproven, "voltmeter-second-daq"):
         objection(OverADriver(driver), f"{way}_alone_brings_the_output_to_0_v")
 
 
@@ -105,7 +106,7 @@ def test_without_any_loopback_the_kit_says_what_a_cable_would_prove():
     contract = OverADriver(PacedDAQ)
     contract.make_loopback = lambda: None
     for test in ("every_output_shows_in_the_loopback_once_and_in_its_order", "the_latency_is_that_of_the_loopback"):
-        with pytest.raises(Unproven, match=r"by a cable or a tee, .* loopback = true"):
+        with refused(Unproven, "by-a-cable-or-a-tee"):
             objection(contract, test)
 
 
@@ -116,7 +117,7 @@ def test_an_honest_clock_is_never_failed_on_a_host_that_is_late(test):
 
 def test_a_stall_of_a_host_that_was_late_is_not_held_against_the_driver():
     stalls = next(fault for fault in PLANTED if fault.driver.__name__ == "StallsFor50Ms")
-    with pytest.raises(Unproven, match="this machine was too busy"):
+    with refused(Unproven, "this-machine-was-too-busy"):
         objection(OverADriver(stalls.driver, Late), stalls.test)
 
 
@@ -145,5 +146,5 @@ def test_a_device_that_goes_on_as_it_says_is_proven_to(test):
 @pytest.mark.parametrize("test", CONTINUING)
 def test_a_device_that_does_not_say_that_it_goes_on_is_not_judged_by_it(test):
     for driver in (PacedDAQ, VirtualDAQ):
-        with pytest.raises(NotApplicable, match=r"does not say|waits for the host"):
+        with refused(NotApplicable, "does-not-say-waits-for-the"):
             getattr(OverADriver(driver), f"test_{test}")()

@@ -42,22 +42,22 @@ def test_the_coefficients_are_those_of_the_sample_rate():
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"frequency_window_hz": (25.0, 27.0)}, "frequency_window_hz"),
-        ({"frequency_window_hz": (27.0, 22.0)}, "frequency_window_hz"),
-        ({"k1": -1.0}, "k1"),
-        ({"centre_frequency_hz": 0.0}, "centre_frequency_hz"),
-        ({"detector": "sign", "phase_lag_deg": -60.0}, "`?phase_lag_deg`? = -60"),
-        ({"k9": 1.0}, "k9"),
+        ({"frequency_window_hz": (25.0, 27.0)}, {"says": "frequency-window-hz"}),
+        ({"frequency_window_hz": (27.0, 22.0)}, {"says": "frequency-window-hz"}),
+        ({"k1": -1.0}, {"field": "k1", "value": -1.0}),
+        ({"centre_frequency_hz": 0.0}, {"field": "centre_frequency_hz", "value": 0.0}),
+        ({"detector": "sign", "phase_lag_deg": -60.0}, {"field": "phase_lag_deg", "value": -60.0, "allowed": "-90"}),
+        ({"k9": 1.0}, {"field": "k9", "value": 1.0}),
     ],
 )
 def test_a_value_that_is_not_allowed_is_named(changes, named):
     table = preset("magnet-beam").model_dump() | changes
-    with pytest.raises(ValidationError, match=named):
+    with refused(ValidationError, **named):
         PhaseLockedLoop.model_validate(table)
 
 
 def test_a_window_beyond_a_quarter_of_the_rate_is_refused():
-    with pytest.raises(ValueError, match="25 Hz"):
+    with refused(ValueError, "at-25-hz"):
         preset("magnet-beam").build(100.0, AmplitudeLaw.VOLTAGE, 5.0)
 
 
@@ -84,20 +84,20 @@ def _second_generation(**changes):
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"frequency_law": "phase"}, "`?k1`?: is missing"),
-        ({"frequency_law": "phase", "k1": 1.0}, "`?k2`?: is missing"),
-        ({"frequency_integral_per_s": 0.0}, "`?frequency_integral_per_s`? = 0"),
-        ({"detector": "sign"}, "allowed: two-phase or adaptive"),
-        ({"period_mean": True}, "`period_mean` = True"),
-        ({"phase_lag_deg": -2.0}, "`?phase_lag_deg`? = -2"),
-        ({"phase_lag_deg": 180.0}, "`?phase_lag_deg`? = 180"),
-        ({"drive_mode_shape": 0.0}, "drive_mode_shape"),
-        ({"harmonics_followed": 13}, "harmonics_followed"),
-        ({"force_loop": "cubic"}, "force_loop"),
+        ({"frequency_law": "phase"}, {"says": "is-missing", "field": "k1"}),
+        ({"frequency_law": "phase", "k1": 1.0}, {"says": "is-missing", "field": "k2"}),
+        ({"frequency_integral_per_s": 0.0}, {"field": "frequency_integral_per_s", "value": 0}),
+        ({"detector": "sign"}, {"field": "detector", "value": "sign", "allowed": "two-phase or adaptive"}),
+        ({"period_mean": True}, {"field": "period_mean", "value": True}),
+        ({"phase_lag_deg": -2.0}, {"field": "phase_lag_deg", "value": -2.0}),
+        ({"phase_lag_deg": 180.0}, {"field": "phase_lag_deg", "value": 180.0}),
+        ({"drive_mode_shape": 0.0}, {"field": "drive_mode_shape", "value": 0.0}),
+        ({"harmonics_followed": 13}, {"field": "harmonics_followed", "value": 13}),
+        ({"force_loop": "cubic"}, {"field": "force_loop", "value": "cubic"}),
     ],
 )
 def test_what_the_frequency_error_law_cannot_do_is_refused(changes, named):
-    with pytest.raises(ValidationError, match=named):
+    with refused(ValidationError, **named):
         _second_generation(**changes)
 
 

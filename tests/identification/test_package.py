@@ -1,9 +1,8 @@
 import subprocess
 import sys
 
-import pytest
-
 import identification
+from tests.refused import refused
 
 
 def test_importing_the_package_imports_none_of_its_libraries() -> None:
@@ -21,5 +20,5 @@ def test_every_public_name_is_there_and_no_module_hides_it() -> None:
     for name in identification.__all__:
         assert getattr(identification, name).__name__ == name
         assert name in dir(identification)
-    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+    with refused(AttributeError, "no-attribute-nonsense"):
         _ = identification.nonsense

@@ -18,6 +18,7 @@ from studies.reproduce.options import Options
 from studies.reproduce.references.output import prepared
 from studies.reproduce.specimens import SPECIMENS
 from tests.recorded import recorded
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 from vibrolock import kernel_cache
 
@@ -61,12 +62,12 @@ def test_a_link_under_the_name_of_a_half_written_file_is_not_written_through(use
 
 def test_what_has_a_journals_name_and_is_none_stays_even_if_it_may_be_overwritten(users, tmp_path):
     users("a.h5.journal")
-    with pytest.raises(RecordingError, match="not a journal of this program"):
+    with refused(RecordingError, "not-a-journal-of-this-program"):
         rig.run("magnet-beam/backbone-short", output=tmp_path / "a.h5", overwrite=True)
 
 
 def test_what_has_the_name_of_a_rehearsals_draws_and_is_none_stays(users, tmp_path):
-    with pytest.raises(RecordingError, match="holds no draws of a rehearsal"):
+    with refused(RecordingError, "holds-no-draws-of-a-rehearsal"):
         discard_draws(users("r.h5.draws"))
     ours = tmp_path / "ours.draws"
     for text in ("", '{"rehe', '{"rehearsal": "0123"}\n'):
@@ -78,12 +79,12 @@ def test_what_has_the_name_of_a_rehearsals_draws_and_is_none_stays(users, tmp_pa
 
 def test_an_emulator_replaces_its_own_bench_log_and_link_alone(users, tmp_path):
     bench = users("bench.toml")
-    with pytest.raises(ConfigurationError, match="was not written by `rig emulate`"):
+    with refused(ConfigurationError, "was-not-written-by-rig-emulate"):
         _check_bench_file(bench)
     ours = tmp_path / "ours.toml"
     ours.write_text(f"{WRITTEN}\nblock = 10\n")
     _check_bench_file(ours)
-    with pytest.raises(ConfigurationError, match="no log of an emulator"):
+    with refused(ConfigurationError, "no-log-of-an-emulator", field="log_output"):
         OutputLog(users("notes.log"))
     log = tmp_path / "log"
     for _ in range(2):
@@ -93,7 +94,7 @@ def test_an_emulator_replaces_its_own_bench_log_and_link_alone(users, tmp_path):
         assert len(log.read_text().splitlines()) == 1
     link = tmp_path / "link"
     link.symlink_to(tmp_path / "on a disk that is not mounted")
-    with pytest.raises(ConfigurationError, match="leads to"), named("/dev/pts/999", link):
+    with refused(ConfigurationError, "leads-to", field="link"), named("/dev/pts/999", link):
         pass
     assert link.readlink() == tmp_path / "on a disk that is not mounted"
     link.unlink()
@@ -122,14 +123,14 @@ def test_a_figure_replaces_figures_of_this_program_alone(users, tmp_path, suffix
 def test_a_study_begins_in_no_folder_with_other_files(users, tmp_path):
     users("study/errors.csv")
     options = Options(specimen=SPECIMENS["magnet-beam"], bench=load_bench("magnet-beam"), folder=tmp_path / "study")
-    with pytest.raises(RecordingError, match="holds files that are of no such study"):
+    with refused(RecordingError, "holds-files-that-are-of-no"):
         prepare(options)
-    with pytest.raises(RecordingError, match="holds files that are of no such study"):
+    with refused(RecordingError, "holds-files-that-are-of-no"):
         prepared(tmp_path / "study")
 
 
 def test_results_of_tests_and_rows_of_a_matrix_replace_such_files_alone(users, tmp_path, command):
-    with pytest.raises(pytest.UsageError, match="no such result"):
+    with refused(pytest.UsageError, "no-such-result"):
         Results(str(users("results.json")))
     Results(str(tmp_path / "new.json"))
     assert "rows" in command(f"doctor --daq magnet-beam -o {users('rows.json')}").err

@@ -5,6 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from simulators.virtual_rig import VirtualRig
+from tests.refused import refused
 
 
 def table(**changes: Any) -> dict[str, Any]:
@@ -23,96 +24,141 @@ MODAL = {"kind": "modal", "frequency_hz": [20.0, 30.0], "damping_ratio": [0.01, 
 BAD: list[tuple[dict[str, Any], str]] = [
     (
         {"specimen": "magnet-beem"},
-        "`?specimen`? = 'magnet-beem'; allowed: friction-beam, magnet-beam, magnet-beam-symmetric",
+        {"field": "specimen", "value": "magnet-beem", "allowed": "friction-beam, magnet-beam, magnet-beam-symmetric"},
     ),
-    ({"specimen": "magnet-beam", "voltage": 1}, "voltage"),
-    ({"specimen": "magnet-beam", "exciter": {"armature_mass": 0.2}}, "exciter.armature_mass\n"),
-    ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": -0.2}}, "greater than 0"),
-    ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": "0.2"}}, "valid number"),
-    ({"specimen": "magnet-beam", "converter": {"substeps": 0}}, "greater than or equal to 1"),
-    ({"specimen": "magnet-beam", "converter": {"sample_rate_hz": float("nan")}}, "finite number"),
+    ({"specimen": "magnet-beam", "voltage": 1}, {"field": "voltage", "value": 1}),
+    ({"specimen": "magnet-beam", "exciter": {"armature_mass": 0.2}}, {"field": "exciter.armature_mass", "value": 0.2}),
+    ({"specimen": "magnet-beam", "exciter": {"armature_mass_kg": -0.2}}, {"says": "greater-than"}),
+    (
+        {"specimen": "magnet-beam", "exciter": {"armature_mass_kg": "0.2"}},
+        {"field": "exciter.armature_mass_kg", "value": "0.2"},
+    ),
+    ({"specimen": "magnet-beam", "converter": {"substeps": 0}}, {"field": "converter.substeps", "value": 0}),
+    (
+        {"specimen": "magnet-beam", "converter": {"sample_rate_hz": float("nan")}},
+        {"says": "finite-number", "field": "converter.sample_rate_hz"},
+    ),
     (
         {"specimen": "magnet-beam", "structure": {"length_m": 0.4}},
-        "`?points_m.acc_magnet`? = 0.40065; allowed: 0 to length_m = 0.4",
+        {"field": "points_m.acc_magnet", "value": 0.40065, "allowed": "0 to length_m = 0.4"},
     ),
-    ({"specimen": "magnet-beam", "structure": {"boundary": "pinned"}}, "'clamped-free', 'clamped-pinned'"),
-    ({"specimen": "magnet-beam", "structure": {"damping_ratio": []}}, "at least 1 item"),
+    (
+        {"specimen": "magnet-beam", "structure": {"boundary": "pinned"}},
+        {"field": "structure.beam.boundary", "value": "pinned"},
+    ),
+    ({"specimen": "magnet-beam", "structure": {"damping_ratio": []}}, {"says": "at-least-item"}),
     (
         {"specimen": "magnet-beam", "structure": {"lumped_masses": [{"at": "x", "mass_kg": 1.0}]}},
-        r"lumped_masses\[0\].at",
+        {
+            "field": "lumped_masses[0].at",
+            "value": "x",
+            "allowed": "one of clamp, drive, acc_drive, acc_magnet, magnet, tip",
+        },
     ),
-    ({"specimen": "magnet-beam", "stinger": {"at": "dive"}}, "`?stinger.at`? = 'dive'; allowed: clamp, drive"),
-    ({"specimen": "magnet-beam", "stinger": {"at": "clamp"}}, "`?stinger.at`? = 'clamp'; allowed: a point that moves"),
+    (
+        {"specimen": "magnet-beam", "stinger": {"at": "dive"}},
+        {"field": "stinger.at", "value": "dive", "allowed": "clamp, drive, acc_drive, acc_magnet, magnet, tip"},
+    ),
+    (
+        {"specimen": "magnet-beam", "stinger": {"at": "clamp"}},
+        {"field": "stinger.at", "value": "clamp", "allowed": "a point that moves"},
+    ),
     (
         {"specimen": "magnet-beam", "structure": {"damping_ratio": [0.01] * 3, "frequency_hz": [20.0, 130.0, 120.0]}},
-        r"`?frequency_hz\[2\]`? = 120(?: \S+)?; allowed: from 130 on, lowest first",
+        {"field": "frequency_hz[2]", "value": 120.0, "allowed": "from 130 on, lowest first"},
     ),
     (
         table() | {"structure": MODAL | {"frequency_hz": [30.0, 20.0], "shapes": {"drive": [1.0, 1.0]}}},
-        r"`?frequency_hz\[1\]`? = 20(?: \S+)?; allowed: from 30 on, lowest first",
+        {"field": "frequency_hz[1]", "value": 20.0, "allowed": "from 30 on, lowest first"},
     ),
     (
         {"specimen": "magnet-beam", "converter": {"oversampling": 2, "anti_alias_hz": 1e-4}},
-        r"`?anti_alias_hz`? = 0.0001(?: \S+)?; allowed: 0, or from 5 on",
+        {"field": "anti_alias_hz", "value": 0.0001, "allowed": "0, or from 5 on, 0.001 of the rate"},
     ),
     (
         {"specimen": "magnet-beam", "converter": {"oversampling": 2, "reconstruction_hz": 4.0}},
-        r"`?reconstruction_hz`? = 4(?: \S+)?; allowed: 0, or from 5 on",
+        {"field": "reconstruction_hz", "value": 4.0, "allowed": "0, or from 5 on, 0.001 of the rate"},
     ),
-    (table(sensors=[]), "at least 1 item"),
+    (table(sensors=[]), {"says": "at-least-item"}),
     (
         table(sensors=[{"name": "a", "kind": "force", "sensitivity_v_per_unit": 1.0, "range_v": 5.0}] * 2),
-        "two are named 'a'",
+        {"field": "sensors", "allowed": "one of each name"},
     ),
     (
         table(sensors=[{"name": "a", "kind": "acceleration", "sensitivity_v_per_unit": 1.0, "range_v": 5.0}]),
-        "`?at`?: is missing",
+        {"says": "is-missing", "field": "at"},
     ),
-    (table(friction=[JOINT | {"stiffness": [1e6], "slip": [1e-3]}]), r"`?friction`?: stiffness 1e\+06 in all"),
-    (table(friction=[JOINT | {"stiffness": [1.0, 2.0], "slip": [1e-3]}]), "`?slip`?: has 1 values; allowed: 2"),
+    (
+        table(friction=[JOINT | {"stiffness": [1e6], "slip": [1e-3]}]),
+        {"field": "friction", "allowed": "less than the structure has there"},
+    ),
+    (
+        table(friction=[JOINT | {"stiffness": [1.0, 2.0], "slip": [1e-3]}]),
+        {"field": "slip", "allowed": "2, one per stiffness"},
+    ),
     (
         table(friction=[JOINT | {"stiffness": [1.0], "slip": [1e-3], "quantity": "deflection"}]),
-        "a coordinate that mode 1 moves",
+        {"field": "friction[0].at", "value": "clamp", "allowed": "a coordinate that mode 1 moves"},
     ),
-    (table(elements=[MAGNET | {"gap_m": 0.0}]), "greater than 0"),
-    (table(elements=[MAGNET | {"at": "tipp"}]), r"`?elements\[0\].at`? = 'tipp'; allowed:"),
-    (table(elements=[MAGNET | {"at": "clamp"}]), r"`?elements\[0\].at`? = 'clamp'; allowed: a point that moves"),
-    (table(elements=[MAGNET | {"to": "tipp"}]), r"`?elements\[0\].to`? = 'tipp'; allowed:"),
-    (table(elements=[MAGNET | {"to": "magnet"}]), r"`?elements\[0\].to`? = 'magnet'; allowed: another point"),
+    (table(elements=[MAGNET | {"gap_m": 0.0}]), {"says": "greater-than"}),
+    (
+        table(elements=[MAGNET | {"at": "tipp"}]),
+        {"field": "elements[0].at", "value": "tipp", "allowed": "clamp, drive, acc_drive, acc_magnet, magnet, tip"},
+    ),
+    (
+        table(elements=[MAGNET | {"at": "clamp"}]),
+        {"field": "elements[0].at", "value": "clamp", "allowed": "a point that moves"},
+    ),
+    (
+        table(elements=[MAGNET | {"to": "tipp"}]),
+        {"field": "elements[0].to", "value": "tipp", "allowed": "clamp, drive, acc_drive, acc_magnet, magnet, tip"},
+    ),
+    (
+        table(elements=[MAGNET | {"to": "magnet"}]),
+        {"field": "elements[0].to", "value": "magnet", "allowed": "another point than at"},
+    ),
     (
         table(elements=[MAGNET | {"kind": "magnet"}]),
-        "'magnet-one-sided', 'magnet-symmetric', 'cubic', 'clearance', 'force-table', 'damping-table', 'user'",
+        {"says": "magnet-one-sided-magnet-symmetric-cubic", "field": "elements.0"},
     ),
     (
         table(elements=[MAGNET, STOP | {"gap_m": 0.011}]),
-        r"`elements\[1\].gap_m` = 0.011 m; allowed: below 0.011, where",
+        {"field": "elements[1].gap_m", "value": 0.011, "allowed": "below 0.011, where the magnet at 'magnet' touches"},
     ),
     (
         table(elements=[MAGNET | {"kind": "magnet-symmetric"}, STOP | {"other_gap_m": 0.02}]),
-        r"`elements\[1\].other_gap_m` = 0.02 m; allowed: below 0.011",
+        {
+            "field": "elements[1].other_gap_m",
+            "value": 0.02,
+            "allowed": "below 0.011, where the magnet at 'magnet' touches",
+        },
     ),
-    (table(elements=[STOP | {"contact_stiffness_n_m": 0.0}]), "greater than 0"),
+    (table(elements=[STOP | {"contact_stiffness_n_m": 0.0}]), {"says": "greater-than"}),
     (
         table(elements=[STOP | {"contact_stiffness_n_m": 1e8}]),
-        r"`elements\[0\]`: its slope of 1e\+08 N/m at 'magnet' is too steep for 4 integration steps per sample; allowed: up "
-        r"to 1\.\d+e\+07, or converter.substeps of at least 10",
+        {"field": "elements[0]", "allowed": "up to 1.66258e+07, or converter.substeps of at least 10"},
     ),
     (
         table(elements=[{"kind": "cubic", "at": "magnet", "stiffness_n_m3": 1e9, "linear_n_m": -1e5}]),
-        "`?elements`?: their linear stiffness takes .* too much from a mode",
+        {"field": "elements", "allowed": "no more than the structure has there"},
     ),
-    (table() | {"structure": MODAL | {"shapes": {"drive": [1.0]}}}, "`?shapes.drive`?: has 1 values; allowed: 2"),
+    (
+        table() | {"structure": MODAL | {"shapes": {"drive": [1.0]}}},
+        {"field": "shapes.drive", "allowed": "2, one per frequency_hz"},
+    ),
     (
         table(elements=[], sensors=table()["sensors"][:1])
         | {"structure": MODAL | {"shapes": {"drive": [1.0, 1.0], "clamp": [1.0, 1.0]}}},
-        "`?quantity`? = 'curvature'",
+        {"field": "friction[0].quantity", "value": "curvature", "allowed": "'deflection' where the modes are given"},
     ),
 ]
 
 
 @pytest.mark.parametrize(("config", "message"), BAD)
-def test_bad_rig_is_refused_with_the_field_and_what_is_allowed(config: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValidationError, match=message):
+def test_bad_rig_is_refused_with_the_field_and_what_is_allowed(
+    config: dict[str, Any], message: dict[str, object]
+) -> None:
+    with refused(ValidationError, **message):
         VirtualRig.model_validate(config)
 
 
@@ -122,7 +168,7 @@ def test_written_out_table_is_a_good_one() -> None:
 
 def test_parts_are_frozen() -> None:
     rig = VirtualRig.shipped("magnet-beam")
-    with pytest.raises(ValidationError, match="frozen"):
+    with refused(ValidationError, field="seed", value=3):
         rig.seed = 3  # type: ignore[misc]
 
 
@@ -152,8 +198,8 @@ def test_a_stop_behind_a_one_sided_magnet_is_no_matter() -> None:
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("import sys; sys.exit(3)", r"SystemExit: 3; allowed: a function that can be imported"),
-        ("raise RuntimeError('one\\ntwo')", r"RuntimeError: one two; allowed: a function that can be imported"),
+        ("import sys; sys.exit(3)", "SystemExit: 3"),
+        ("raise RuntimeError('one\\ntwo')", "RuntimeError: one two"),
     ],
 )
 def test_a_module_that_fails_as_it_is_imported_is_named_in_one_line(
@@ -161,5 +207,11 @@ def test_a_module_that_fails_as_it_is_imported_is_named_in_one_line(
 ) -> None:
     (tmp_path / "failing.py").write_text(source)
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(ValidationError, match=f"`function` = 'failing:f': {message}"):
+    with refused(
+        ValidationError,
+        field="function",
+        value="failing:f",
+        reason=message,
+        allowed="a function that can be imported",
+    ):
         VirtualRig.shipped("magnet-beam", elements=[{"kind": "user", "at": "tip", "function": "failing:f"}])

@@ -14,6 +14,7 @@ from joblib import parallel_config
 from simulators.ensemble import VariantError, ensemble
 from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
+from tests.refused import refused
 from tests.waiting import LONG_S, wait_until
 
 
@@ -75,7 +76,7 @@ def test_variants_are_taken_as_workers_come_free_and_not_all_at_once() -> None:
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_failing_variant_is_named(n_jobs: int) -> None:
-    with pytest.raises(VariantError, match="variant stiff: ZeroDivisionError: float division by zero"):
+    with refused(VariantError, "variant-stiff-zerodivisionerror-float-division-by"):
         list(ensemble({"soft": 2.0, "stiff": 0.0}, reciprocal, n_jobs=n_jobs))
 
 

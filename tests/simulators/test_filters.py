@@ -14,6 +14,7 @@ from simulators.shipped import shipped_specimens
 from simulators.simulation import Simulation
 from simulators.stepping import run_open_loop
 from simulators.virtual_rig import VirtualRig
+from tests.refused import refused
 from tests.simulators.references import UNFILTERED, ideal
 
 SLOW = {"sample_rate_hz": 800.0, "oversampling": 10, "substeps": 20}
@@ -238,22 +239,30 @@ def test_oversampling_without_filters_changes_no_reading() -> None:
 @pytest.mark.parametrize(
     ("converter", "message"),
     [
-        ({"oversampling": 3, "substeps": 4}, "substeps`? = 4; allowed: a multiple of oversampling = 3"),
-        (FILTERED | {"anti_alias_hz": 400.0}, r"`?anti_alias_hz`? = 400(?: \S+)?; allowed: below 400, half the rate"),
+        (
+            {"oversampling": 3, "substeps": 4},
+            {"field": "substeps", "value": 4, "allowed": "a multiple of oversampling = 3"},
+        ),
+        (
+            FILTERED | {"anti_alias_hz": 400.0},
+            {"field": "anti_alias_hz", "value": 400.0, "allowed": "below 400, half the rate"},
+        ),
         (
             FILTERED | {"reconstruction_hz": 5e3},
-            r"`?reconstruction_hz`? = 5000(?: \S+)?; allowed: below 4000, half the internal rate",
+            {"field": "reconstruction_hz", "value": 5000.0, "allowed": "below 4000, half the internal rate"},
         ),
-        (FILTERED | {"oversampling": 4}, "oversampling`? = 4; allowed: at least 5 with a filter"),
-        ({"oversampling": 1}, "oversampling`? = 1; allowed: at least 2 with a filter"),
+        (FILTERED | {"oversampling": 4}, {"field": "oversampling", "value": 4}),
+        ({"oversampling": 1}, {"field": "oversampling", "value": 1}),
     ],
 )
-def test_converter_that_cannot_filter_is_refused(converter: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValidationError, match=message):
+def test_converter_that_cannot_filter_is_refused(converter: dict[str, Any], message: dict[str, object]) -> None:
+    with refused(ValidationError, **message):
         VirtualRig.shipped("magnet-beam", converter=converter)
 
 
 def test_low_pass_beyond_the_internal_rate_is_refused() -> None:
     sensors = [ideal().sensors[0].model_dump() | {"low_pass_hz": 2500.0}]
-    with pytest.raises(ValidationError, match=r"`sensors\[0\].low_pass_hz` = 2500 Hz; allowed: below 2500"):
+    with refused(
+        ValidationError, field="sensors[0].low_pass_hz", value=2500.0, allowed="below 2500, half the internal rate"
+    ):
         ideal(sensors=sensors)

@@ -160,33 +160,39 @@ def test_a_change_of_the_plant_takes_no_new_modes(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(
     ("wear", "message"),
     [
-        ({"frequency_per_s": [-1e-4, 0.0]}, r"wear\n  Value error, `until_s`: is missing; allowed: below 10000"),
+        (
+            {"frequency_per_s": [-1e-4, 0.0]},
+            {"field": "until_s", "allowed": "below 10000, where frequency_per_s = -0.0001 reaches -100 %"},
+        ),
         (
             {"frequency_per_s": [1e-4, 0.0]},
-            "wear.frequency_per_s`?: has 2 values; allowed: 4, one per mode, one for all",
+            {"field": "wear.frequency_per_s", "allowed": "4, one per mode, one for all, or none"},
         ),
-        ({"damping_per_s": [0.0] * 5}, "wear.damping_per_s`?: has 5 values; allowed: 4"),
+        (
+            {"damping_per_s": [0.0] * 5},
+            {"field": "wear.damping_per_s", "allowed": "4, one per mode, one for all, or none"},
+        ),
         (
             {"frequency_per_s": [-1e-2], "until_s": 100.0},
-            "`until_s` = 100 s; allowed: below 100, where frequency_per_s",
+            {"field": "until_s", "value": 100.0, "allowed": "below 100, where frequency_per_s = -0.01 reaches -100 %"},
         ),
         (
             {"damping_per_s": [-0.5, 0, 0, 0], "until_s": 3.0},
-            "`until_s` = 3 s; allowed: below 2, where damping_per_s = -0.5",
+            {"field": "until_s", "value": 3.0, "allowed": "below 2, where damping_per_s = -0.5 reaches -100 %"},
         ),
         (
             {"frequency_per_s": [-1e-2], "until_s": 99.0},
-            r"`?wear.until_s`? = 99(?: \S+)?: then `?friction`?: stiffness",
+            {"field": "wear.until_s", "value": 99.0},
         ),
-        ({"frequency_per_s": [-2.0]}, "greater than or equal to -1"),
-        ({"every_s": 0.0}, "greater than 0"),
-        ({"every_s": -1.0}, "greater than 0"),
-        ({"until_s": -1.0}, "greater than 0"),
-        ({"every_s": 1e-4}, r"wear.every_s`? = 0.0001(?: \S+)?; allowed: from 0.0002, one sample"),
+        ({"frequency_per_s": [-2.0]}, {"field": "wear.frequency_per_s.0", "value": -2.0}),
+        ({"every_s": 0.0}, {"says": "greater-than"}),
+        ({"every_s": -1.0}, {"says": "greater-than"}),
+        ({"until_s": -1.0}, {"says": "greater-than"}),
+        ({"every_s": 1e-4}, {"field": "wear.every_s", "value": 0.0001, "allowed": "from 0.0002, one sample"}),
     ],
 )
-def test_wear_that_is_not_physical_is_refused(wear: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValidationError, match=message):
+def test_wear_that_is_not_physical_is_refused(wear: dict[str, Any], message: dict[str, object]) -> None:
+    with refused(ValidationError, **message):
         VirtualRig.shipped("magnet-beam", wear=wear)
 
 

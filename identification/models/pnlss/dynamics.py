@@ -72,7 +72,7 @@ class PnlssDynamics(BalancedModel):
         s = s[-s.real <= _LIGHT * np.abs(s)]
         if not s.size:
             raise IdentificationError(
-                "band_hz: not given, and the model's linear part has no lightly damped mode to set them by"
+                "not given, and the model's linear part has no lightly damped mode to set it by", field="band_hz"
             )
         low, high = (2.0 * np.pi * f for f in model.excited_hz or (0.0, np.inf))
         inside = (np.abs(s) >= low) & (np.abs(s) <= high)

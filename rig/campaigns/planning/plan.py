@@ -171,8 +171,11 @@ class Plan(Configured):
         most = int(rate_hz / highest_hz / 2.0) - spare
         if most < 1:
             raise ConfigurationError(
-                f"{highest_hz:g} Hz: is too high for {rate_hz:g} samples/s of the bench {bench.name}; allowed is up to "
-                f"{rate_hz / (2.0 * (1 + spare)):g} Hz"
+                f"is too high for {rate_hz:g} samples/s of the bench {bench.name}",
+                field="highest frequency",
+                value=highest_hz,
+                unit="Hz",
+                allowed=f"up to {rate_hz / (2.0 * (1 + spare)):g} Hz",
             )
         if harmonics > most:
             raise ConfigurationError(

@@ -38,7 +38,7 @@ class RowBuffer:
                 self._spool.add(self._chunks.popleft()[1])
         except OSError as error:
             where = self._folder or "the folder for temporary files"
-            raise RecordingError(f"{where}: the rows of a long record cannot be kept ({error.strerror})") from error
+            raise RecordingError(f"the rows of a long record cannot be kept ({error.strerror})", where=where) from error
 
     def take(self, first: int, end: int) -> Rows:
         """Return the rows of a point, and drop all rows up to the end of the point."""

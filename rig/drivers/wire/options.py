@@ -89,10 +89,11 @@ def watchdog_s(options: WireOptions, device_s: float, block_s: float, *, moves: 
             allowed=f"from {shortest_s:g} s on, {SHORTEST_BLOCKS} blocks",
         )
     if chosen_s > longest_s and moves:
-        whose = "" if options.watchdog_s else ", the shortest that the device can do"
         raise DaqRefused(
-            f"driver.options.watchdog_s = {chosen_s:g}{whose}: allowed is up to {longest_s:g} s "
-            "for a device that may move something: it holds its last output for as long"
+            "" if options.watchdog_s else "is the shortest that the device can do",
+            field="driver.options.watchdog_s",
+            value=chosen_s,
+            allowed=f"up to {longest_s:g} s for a device that may move something: it holds its last output for as long",
         )
     return chosen_s
 

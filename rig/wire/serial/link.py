@@ -191,4 +191,4 @@ class SerialLink(Link):
     def _gone(self, why: object) -> DaqDisconnected:
         if self._descriptor < 0:
             return DaqDisconnected(f"{self.name}: the port is not open")
-        return DaqDisconnected(f"{self.name}: the port is gone (unplugged or switched off): {why}")
+        return DaqDisconnected(f"the port is gone (unplugged or switched off): {why}", where=self.name)

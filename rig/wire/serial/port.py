@@ -111,7 +111,7 @@ def _refusal(path: str, baud: int, error: Exception) -> DaqError:
     is_of_termios = isinstance(cause, termios.error) and bool(cause.args)
     number = int(cause.args[0]) if cause and is_of_termios else getattr(error, "errno", None)
     if number in BUSY:
-        return DaqBusy(f"port {path!r}: somebody else holds it; close the other program")
+        return DaqBusy("somebody else holds it", where=f"port {path!r}", hint="close the other program")
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO):
         names = port_names()
         there = ", ".join(names) or "none"
@@ -122,7 +122,7 @@ def _refusal(path: str, baud: int, error: Exception) -> DaqError:
     if number in (errno.EACCES, errno.EPERM):
         return DaqRefused(f"port {path!r}: no permission to open it; on Linux, join the group that owns it (dialout)")
     if number in (errno.ENOTTY, errno.EISDIR):
-        return DaqRefused(f"port {path!r}: it is no serial port")
+        return DaqRefused("it is no serial port", where=f"port {path!r}")
     if number is None:
         return DaqRefused(f"port {path!r} at {baud} baud: {error}")
     return DaqRefused(f"port {path!r}: it cannot be opened as a serial port: {error}")

@@ -64,6 +64,7 @@ def _checked(data: DataSet, file: DataFile, folder: Path) -> Path:
         if digest == file.sha256:
             return path
     raise RecordingError(
-        f"{there[0]}: is another file or another version: its SHA-256 is {digest}, that of the study {file.sha256}; get it "
-        f"from {data.source}"
+        f"is another file or another version: its SHA-256 is {digest}, that of the study {file.sha256}",
+        where=there[0],
+        hint=f"get it from {data.source}",
     )

@@ -5,6 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from identification import TimeDataMapping, map_time_data
+from tests.refused import refused
 
 VOLTS = np.array([0.01, -0.02, 0.03, 0.005])
 
@@ -22,5 +23,5 @@ def test_stored_volts_become_an_acceleration(unit, factor):
 
 
 def test_a_sensitivity_beside_another_unit_than_volts_is_refused():
-    with pytest.raises(ValidationError, match="allowed: V or mV"):
+    with refused(ValidationError, field="unit", value="m/s2", allowed="V or mV"):
         mapping("m/s2", "10 mV/g")

@@ -95,28 +95,46 @@ def test_a_single_structure_is_a_list_of_one() -> None:
 @pytest.mark.parametrize(
     ("entry", "changes", "message"),
     [
-        ({}, {"levels": "data.level"}, r"sets\[0\].levels: path 'data.level': no 'level' at 'data', which has levels"),
-        ({}, {"levels": "Data"}, r"no 'Data' at the top, which has data$"),
-        ({}, {"levels": "data.levels[3].x"}, r"no \[3\] at 'data.levels', which has 1 entries"),
-        ({}, {"levels": "data..levels"}, "'data..levels' is no path"),
+        ({}, {"levels": "data.level"}, {"says": "sets-levels-path-data-level-no"}),
+        ({}, {"levels": "Data"}, {"says": "no-data-at-the-top-which"}),
+        ({}, {"levels": "data.levels[3].x"}, {"says": "no-at-data-levels-which-has"}),
+        ({}, {"levels": "data..levels"}, {"says": "data-levels-is-no-path"}),
         (
             {},
             {"force": "Force"},
-            r"sets\[0\].force, level 1: path 'Force': no 'Force' at the top, which has f, F, A, ph",
+            {"says": "sets-force-level-path-force-no"},
         ),
-        ({"F": "2 N"}, {}, r"sets\[0\].force, level 1 'F': is text; allowed: numbers"),
-        ({"F": [[1.0, 2.0], [3.0]]}, {}, r"'F': is a list of unequal lengths; allowed: numbers"),
-        ({"F": np.ones((3, 2))}, {}, r"has shape \(3, 2\); allowed: a vector"),
-        ({"F": np.ones(4)}, {}, r"sets\[0\], level 1: unequal lengths .*'force': 4"),
-        ({"F": -FORCE_N}, {}, r"sets\[0\].force, level 1: an amplitude is below zero"),
-        ({"A": np.array([1.0, np.nan, 1.0])}, {}, r"sets\[0\], level 1: `response`: value at \[1\]"),
-        ({"A": ACCELERATION}, {}, r"`sets\[0\].phase`: is given, but 'A' holds complex numbers"),
-        ({}, {"level_values": [5.0, 6.0]}, r"`sets\[0\].level_values`: 2 given, the data has 1 levels"),
-        ({}, {"label": "{name}"}, r"sets\[0\], level 1: 'name'"),
+        (
+            {"F": "2 N"},
+            {},
+            {"says": "sets-force-level-f-is-text", "allowed": "numbers", "where": "sets[0].force, level 1 'F'"},
+        ),
+        (
+            {"F": [[1.0, 2.0], [3.0]]},
+            {},
+            {"says": "f-is-a-list-of-unequal", "allowed": "numbers", "where": "sets[0].force, level 1 'F'"},
+        ),
+        (
+            {"F": np.ones((3, 2))},
+            {},
+            {"says": "has-shape-allowed-a-vector", "allowed": "a vector", "where": "sets[0].force, level 1 'F'"},
+        ),
+        ({"F": np.ones(4)}, {}, {"says": "sets-level-unequal-lengths-force"}),
+        ({"F": -FORCE_N}, {}, {"says": "sets-force-level-an-amplitude-is"}),
+        ({"A": np.array([1.0, np.nan, 1.0])}, {}, {"field": "response", "allowed": "finite"}),
+        ({"A": ACCELERATION}, {}, {"says": "sets-phase-is-given-but-a", "field": "sets[0].phase"}),
+        (
+            {},
+            {"level_values": [5.0, 6.0]},
+            {"says": "sets-level-values-given-the-data", "field": "sets[0].level_values"},
+        ),
+        ({}, {"label": "{name}"}, {"says": "sets-level-name", "where": "sets[0], level 1"}),
     ],
 )
-def test_what_does_not_fit_is_named_in_one_line(entry: dict[str, Any], changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(IdentificationError, match=message) as caught:
+def test_what_does_not_fit_is_named_in_one_line(
+    entry: dict[str, Any], changes: dict[str, Any], message: dict[str, object]
+) -> None:
+    with refused(IdentificationError, **message) as caught:
         map_frequency_responses(data(**entry), mapping(**changes))
     assert "\n" not in str(caught.value)
 

@@ -182,7 +182,7 @@ def test_a_mode_survives_being_stored_and_its_table_is_json() -> None:
     assert (again.source, again.specimen, again.notes) == ("backbone", "beam", mode.notes)
     row = json.loads(json.dumps(mode.table(), allow_nan=False))[0]
     assert {"force_n", "modal_frequency_hz", "damping_ratio", "modal_amplitude", "mac", "amplitude_m"} <= set(row)
-    with pytest.raises(IdentificationError, match="'force_n' is missing"):
+    with refused(IdentificationError, "force-n-is-missing", where="nonlinear mode"):
         decode(NonlinearMode, {k: v for k, v in arrays.items() if k != "force_n"}, attributes)
 
 

@@ -13,6 +13,7 @@ from rig.campaigns.running.continuation import remaining
 from rig.errors import ConfigurationError
 from rig.measurements import sweeps
 from rig.recording.reader import Recording
+from tests.refused import refused
 
 MODULE = """
 from pathlib import Path
@@ -85,7 +86,7 @@ def test_what_a_recording_names_is_imported_by_resume_with_trust_only(lab, comma
         f"rig: run.h5: bench: function = '{lab}:drag': is code that the recording names, and is not imported unless you "
         "trust it: --trust-code\n"
     )
-    with pytest.raises(ConfigurationError, match="`trust_code`"):
+    with refused(ConfigurationError, "trust-code", field="bench"):
         rig.resume("run.h5", plan="other.toml")
     assert not Path("imported.txt").exists()
     assert lab not in sys.modules

@@ -7,6 +7,7 @@ import pytest
 
 from rig.cli import monitor_process as module
 from rig.cli.monitor_process import monitor_process
+from tests.refused import refused
 
 
 def started(monkeypatch, code):
@@ -68,7 +69,7 @@ def test_where_no_process_can_be_had_the_run_goes_on(monkeypatch, capsys):
 
 def test_an_error_of_the_run_is_its_own(monkeypatch, capsys):
     pages = started(monkeypatch, 'print(\'{"address": "http://x"}\', flush=True)')
-    with pytest.raises(ValueError, match="of the run"), monitor_process(True):
+    with refused(ValueError, "of-the-run"), monitor_process(True):
         raise ValueError("of the run")
     assert "http://x" in capsys.readouterr().err
     pages[0].returncode = None

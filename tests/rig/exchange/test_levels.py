@@ -88,7 +88,7 @@ def test_binary_keeps_every_bit_of_uneven_frequencies_where_ascii_keeps_six_digi
 
 @pytest.mark.parametrize(("format_", "encoding"), [("mat", "ascii"), ("uff", "hex")])
 def test_an_encoding_is_one_of_two_and_of_universal_files(multisine_file, format_, encoding, tmp_path):
-    with pytest.raises(ConfigurationError, match=f"`encoding` = '{encoding}'; allowed: ascii or binary, of format uff"):
+    with refused(ConfigurationError, field="encoding", value=encoding, allowed="ascii or binary, of format uff"):
         export_file(multisine_file, tmp_path / f"out.{format_}", format_, encoding=encoding)
 
 

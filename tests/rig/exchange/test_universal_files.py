@@ -176,25 +176,25 @@ def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
 @pytest.mark.parametrize(
     ("datasets", "message"),
     [
-        ([response(np.ones(20))], r"the ordinate has no unit.*`units` si"),
-        ([units(), response(np.ones(20), label="furlong")], r"is 'furlong'; allowed: m, mm"),
-        ([units(), units(2, 3.28, 0.22), response(np.ones(20))], r"units \(dataset 164\): 2 different ones"),
-        ([units(), response(np.ones(20)), response(np.ones(20))], r"a second response of 1\+Z to 1\+Z"),
+        ([response(np.ones(20))], {"says": "the-ordinate-has-no-unit-units"}),
+        ([units(), response(np.ones(20), label="furlong")], {"says": "is-furlong-allowed-m-mm"}),
+        ([units(), units(2, 3.28, 0.22), response(np.ones(20))], {"says": "units-dataset-different-ones"}),
+        ([units(), response(np.ones(20)), response(np.ones(20))], {"says": "second-response-of-to"}),
         (
             [units(), response(np.ones(20)), response(np.ones(20), rsp=(2, 3), ref=(2, 3))],
-            r"there is none of 1\+Z to 2\+Z, 2\+Z to 1\+Z",
+            {"says": "there-is-none-of-z-to"},
         ),
         (
             [units(), response(np.ones(20)), response(np.ones(20), rsp=(2, 3), x=FREQUENCY + 1)],
-            r"frequencies are not those",
+            {"says": "frequencies-are-not-those"},
         ),
-        ([units(), signal(np.ones(10))], r"holds time data; say by `mapping`"),
-        ([units()], r"holds neither frequency responses"),
+        ([units(), signal(np.ones(10))], {"says": "holds-time-data-say-by-mapping"}),
+        ([units()], {"says": "holds-neither-frequency-responses"}),
     ],
 )
 def test_what_is_unclear_is_said_in_one_line(tmp_path, datasets, message):
     path = written(tmp_path / "unclear.uff", *datasets)
-    with pytest.raises(ImportFailed, match=message) as caught:
+    with refused(ImportFailed, **message) as caught:
         import_file(path)
     assert "\n" not in str(caught.value)
     assert "unclear.uff" in str(caught.value)

@@ -24,6 +24,7 @@ from rig.results.kinds import all_kinds
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response
 from tests.identification.rigs import CHANNELS, one_mode_point
+from tests.refused import refused
 
 
 @pytest.fixture(autouse=True)
@@ -171,14 +172,14 @@ def test_a_page_of_ones_own_is_drawn_on(mode, pyplot):
 
 def test_what_has_no_figure_is_named():
     for thing, name in ((3, "int"), ((1, 2), "tuple"), ({}, "dict")):
-        with pytest.raises(TypeError, match=f"no figure for {name}"):
+        with refused(TypeError, f"no-figure-for-{name}"):
             figures.plot(thing)
 
 
 def test_options_of_files_are_refused_for_results(mode):
-    with pytest.raises(TypeError, match="lateness"):
+    with refused(TypeError, "lateness"):
         mode.plot(lateness=True)
-    with pytest.raises(TypeError, match="2 things"):
+    with refused(TypeError, "things"):
         figures.plot(mode, mode)
 
 

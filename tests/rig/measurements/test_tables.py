@@ -110,5 +110,6 @@ def test_without_the_library_one_line_says_how_to_get_it(run, library, table, mo
         return real(name, *arguments, **further)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(ImportError, match=rf"{library} is not installed.*vibrolock\[tables\]"):
+    with refused(ImportError, "is-not-installed-tables") as caught:
         getattr(run, table)()
+    assert library in str(caught.value)

@@ -20,6 +20,7 @@ from rig.results.structured.figure import draw_structured
 from rig.results.structured.model import IdentifiedStructured
 from rig.results.structured.options import StructuredOptions
 from tests.recorded import recorded_at
+from tests.refused import refused
 from tests.rig.exchange.structured_models import structure
 from tests.sharing import copy_of, made_once, shared_folder
 
@@ -242,13 +243,13 @@ def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_t
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda told: told["model"]["elements"][0]["laws"][0].update(kind="magic"), "kind is 'magic'; allowed: "),
-        (lambda told: told["model"]["elements"][0].pop("laws"), "'laws' is missing or unknown"),
-        (lambda told: told["model"]["elements"][0].update(laws=[3]), "does not hold what makes a structured"),
-        (lambda told: told["model"].update(steps="many"), "does not hold what makes a structured"),
-        (lambda told: told["model"].update(later=1), "is missing or unknown"),
-        (lambda told: told.pop("model"), "holds neither a fit nor a model"),
-        (lambda told: told.pop("runs"), "runs: is missing"),
+        (lambda told: told["model"]["elements"][0]["laws"][0].update(kind="magic"), {"says": "kind-is-magic-allowed"}),
+        (lambda told: told["model"]["elements"][0].pop("laws"), {"says": "laws-is-missing-or-unknown"}),
+        (lambda told: told["model"]["elements"][0].update(laws=[3]), {"says": "does-not-hold-what-makes-a"}),
+        (lambda told: told["model"].update(steps="many"), {"says": "does-not-hold-what-makes-a"}),
+        (lambda told: told["model"].update(later=1), {"says": "is-missing-or-unknown"}),
+        (lambda told: told.pop("model"), {"says": "holds-neither-a-fit-nor-a"}),
+        (lambda told: told.pop("runs"), {"says": "runs-is-missing"}),
     ],
 )
 def test_what_is_no_such_file_is_named(change, said, tmp_path):
@@ -258,7 +259,7 @@ def test_what_is_no_such_file_is_named(change, said, tmp_path):
     kind, arrays, attributes = read_arrays(tmp_path / "m.h5")
     change(attributes)
     write_arrays(tmp_path / "m.h5", kind, arrays, attributes)
-    with pytest.raises(RecordingError, match=said):
+    with refused(RecordingError, **said):
         load(tmp_path / "m.h5")
 
 
@@ -266,7 +267,7 @@ def test_a_file_that_lacks_an_array_is_named(tmp_path):
     save(structure(), tmp_path / "m.h5")
     with h5py.File(tmp_path / "m.h5", "r+") as file:
         del file["arrays/model/direct"]
-    with pytest.raises(RecordingError, match=r"m\.h5: "):
+    with refused(RecordingError, "message"):
         load(tmp_path / "m.h5")
 
 

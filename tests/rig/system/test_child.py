@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.system.child import ChildFailed, ask_child
+from tests.refused import refused
 from tests.waiting import LONG_S, wait_until
 
 CHILD = "tests.rig.children"
@@ -22,17 +23,17 @@ def test_a_child_answers_by_what_it_prints():
 
 @posix
 def test_a_crash_is_named():
-    with pytest.raises(ChildFailed, match=r"crashed \(SIGSEGV\)"):
+    with refused(ChildFailed, "crashed-sigsegv"):
         ask_child(CHILD, "crash", timeout_s=60.0)
 
 
 def test_a_child_that_ends_without_an_answer_is_told():
-    with pytest.raises(ChildFailed, match=r"crashed \(status 3\)"):
+    with refused(ChildFailed, "crashed-status"):
         ask_child(CHILD, "fail", timeout_s=60.0)
 
 
 def test_a_child_that_hangs_is_ended():
-    with pytest.raises(ChildFailed, match="took more than 1 s"):
+    with refused(ChildFailed, "took-more-than-s"):
         ask_child(CHILD, "hang", timeout_s=1.0)
 
 

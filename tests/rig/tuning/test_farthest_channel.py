@@ -7,6 +7,7 @@ from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.tuning import TuningRequest, tune
 from rig.tuning.levels import reach_m
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 
 POINTS = {"drive": 0.2, "acc_drive": 0.22, "acc_magnet": 0.55}  # driven near the clamp, the last sensor at the tip
@@ -46,17 +47,13 @@ def test_the_highest_level_keeps_the_tip_within_its_limit(tuned):
 
 
 def test_a_level_asked_for_that_takes_the_tip_beyond_its_limit_is_refused(tmp_path):
-    with pytest.raises(
-        ConfigurationError, match=r"`to_m` = 0\.001 m; allowed: up to 0\.0005\d+ m, where .*'acc_magnet'"
-    ):
+    with refused(ConfigurationError, field="to_m", value=0.001):
         tune(far_tip(), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02, to_m=0.001))
 
 
 def test_the_plan_refuses_a_level_that_a_person_raised_beyond_the_limit_of_the_tip(tuned):
     raised = tuned.plan.model_copy(update={"levels_m": (1e-4, 1e-3)})
-    with pytest.raises(
-        ConfigurationError, match=r"`levels_m\[1\]` = 0\.001 m: means 0\.0051\d m at channel 'acc_magnet'"
-    ):
+    with refused(ConfigurationError, field="levels_m[1]", value=0.001):
         raised.check(tuned.bench)
     tuned.plan.check(tuned.bench)
 

@@ -116,7 +116,7 @@ def test_a_wrong_mode_shape_of_the_bench_is_said_and_not_used(magnet):
 @pytest.mark.parametrize("factor", [0.7, 1.3])
 def test_a_linear_frequency_that_is_30_percent_off_is_refused_with_the_measured_one(factor, tmp_path):
     wrong = bench_with({"specimen": {"linear_frequency_hz": factor * 24.37}})
-    with pytest.raises(TuningError, match=r"mode that answers lies at 24\.3"):
+    with refused(TuningError, field="specimen.linear_frequency_hz", value=31.681, allowed="10 %"):
         tune(wrong, tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
@@ -146,7 +146,7 @@ def sensors_with(name, **changes):
 @pytest.mark.parametrize("name", ["force", "drive"])
 def test_a_dead_sensor_is_named(name, tmp_path):
     bench = bench_with(sensors=sensors_with(name, sensitivity_v_per_unit=1e-9, noise_rms=0.0))
-    with pytest.raises(TuningError, match=f"dead, stuck or below one bit .* on channel {name}"):
+    with refused(TuningError, f"dead-stuck-or-below-one-bit-{name}"):
         tune(bench, tmp_path / "test.h5")
 
 
@@ -164,13 +164,13 @@ def test_a_sensor_that_is_mounted_the_other_way_round_is_told(tmp_path):
         else channel
         for channel in table["channels"]
     ]
-    with pytest.raises(TuningError, match="polarity"):
+    with refused(TuningError, "polarity"):
         tune(Bench.model_validate(table), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
 def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_said(tmp_path):
     bench = bench_with(name="friction-beam", delay_samples=1000)
-    with pytest.raises(TuningError, match=r"unsuited .* sets of gains tried; .* max \|S\| [\d.]+"):
+    with refused(TuningError, "unsuited-sets-of-gains-tried-max"):
         tune(bench, tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 

@@ -102,7 +102,7 @@ def test_bad_values_are_named(analysis: Callable[..., Any], arguments: dict[str,
 
 def test_a_level_out_of_reach_is_named_and_the_points_before_it_are_kept() -> None:
     softening = one_mode(elements=[{"kind": "cubic", "at": "drive", "stiffness_n_m3": -3e8}])
-    with pytest.raises(NotConvergedError, match=r"force .* N, lag -90 deg") as caught:
+    with refused(NotConvergedError, "force-n-lag-deg") as caught:
         phase_resonance_backbone(softening, forces_n=[0.1, 0.5, 1000.0])
     assert caught.value.found is not None
     np.testing.assert_allclose(caught.value.found.force_n, [0.1, 0.5], rtol=1e-8)
@@ -148,7 +148,7 @@ FREE = ideal(
 
 
 def test_a_free_motion_that_a_site_pushes_is_refused_and_one_that_none_pushes_is_not() -> None:
-    with pytest.raises(ValueError, match="structure: has a motion that no stiffness holds"):
+    with refused(ValueError, "structure-has-a-motion-that-no"):
         phase_resonance_backbone(FREE, forces_n=[0.1])
     linear = FREE.model_copy(update={"elements": ()})
     found = phase_resonance_backbone(VirtualRig.model_validate(linear.model_dump()), forces_n=[0.1])
@@ -163,7 +163,7 @@ def test_the_mode_nearest_to_a_frequency_is_no_free_motion() -> None:
 
 def test_the_level_that_was_asked_for_is_named_where_the_path_ends_before_it() -> None:
     softening = one_mode(elements=[{"kind": "cubic", "at": "drive", "stiffness_n_m3": -3e8}])
-    with pytest.raises(NotConvergedError, match=r"^force 1000 N, lag -90 deg: no periodic vibration found at force "):
+    with refused(NotConvergedError, "force-n-lag-deg-no-periodic"):
         phase_resonance_backbone(softening, forces_n=[1000.0])
 
 

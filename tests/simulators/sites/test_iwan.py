@@ -8,6 +8,7 @@ from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
 from simulators.sites.friction import IwanSite
+from tests.refused import refused
 
 TABLE = {"kind": "iwan", "at": "joint", "stiffness_n_m": 2e8, "phi_max_m": 3e-6, "chi": -0.4, "beta": 0.7}
 # Stiffness (N/m) and slip force (N) of the calibrated outermost joint: eight elements and an end slider.
@@ -94,13 +95,15 @@ def test_there_are_eight_elements_and_a_slider_unless_said_otherwise() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"chi": -1.0}, "chi\n.*greater than -1"),
-        ({"beta": -0.1}, "beta\n.*greater than or equal to 0"),
-        ({"phi_max_m": 0.0}, "phi_max_m\n.*greater than 0"),
-        ({"n_element": 0}, "n_element\n.*greater than or equal to 1"),
-        ({"relative_to_mode_1": True}, "relative_to_mode_1\n.*Extra inputs"),
+        ({"chi": -1.0}, {"field": "chi", "value": -1.0}),
+        ({"beta": -0.1}, {"field": "beta", "value": -0.1}),
+        ({"phi_max_m": 0.0}, {"field": "phi_max_m", "value": 0.0}),
+        ({"n_element": 0}, {"field": "n_element", "value": 0}),
+        ({"relative_to_mode_1": True}, {"field": "relative_to_mode_1", "value": True}),
     ],
 )
-def test_bad_joint_is_refused_with_the_field_and_what_is_allowed(change: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValidationError, match=message):
+def test_bad_joint_is_refused_with_the_field_and_what_is_allowed(
+    change: dict[str, Any], message: dict[str, object]
+) -> None:
+    with refused(ValidationError, **message):
         site(**change)

@@ -11,6 +11,7 @@ from simulators.plant.sites import local_sites
 from simulators.simulation import Simulation
 from simulators.sites.elements import DampingTable, ForceTable
 from simulators.virtual_rig import VirtualRig
+from tests.refused import refused
 from tests.simulators.analysis.rigs import DAMPING_RATIO, FREQUENCY_HZ, SHAPE, one_mode
 from tests.simulators.sites.test_elements import MASS_KG, free_motion, oscillator
 
@@ -113,14 +114,38 @@ def run_from(rig, x_m):
 @pytest.mark.parametrize(
     ("part", "change", "message"),
     [
-        (ForceTable, {"deflection_m": [0.0, 1.0, 2.0, 3.0, 4.0]}, "`deflection_m` = '0 to 4'; allowed: rising numbers"),
-        (ForceTable, {"deflection_m": [-1.0, 1.0, 0.0, 3.0, 4.0]}, "allowed: rising numbers from below 0"),
-        (ForceTable, {"deflection_m": [-1.0, 0.1, 2.0, 3.0, 4.0]}, "with 0 itself"),
-        (ForceTable, {"deflection_m": [-1.0, 0.0, 1.0]}, "at least 5 items"),
-        (ForceTable, {"force_n": [0.0, 0.0]}, "force_n`?: has 2 values; allowed: 5, one per deflection_m"),
-        (ForceTable, {"force_n": [0.0, 0.0, 0.5, 0.0, 0.0]}, "force_n`? = 0.5 at deflection 0: allowed is 0"),
-        (DampingTable, {"damping_n_s_m": [0.0] * 4}, "damping_n_s_m`?: has 4 values; allowed: 5"),
-        (DampingTable, {"damping_n_s_m": [0.0, 1.0, -1.0, 0.0, 0.0]}, "greater than or equal to 0"),
+        (
+            ForceTable,
+            {"deflection_m": [0.0, 1.0, 2.0, 3.0, 4.0]},
+            {
+                "field": "deflection_m",
+                "value": "0 to 4",
+                "allowed": "rising numbers from below 0 to above 0, with 0 itself",
+            },
+        ),
+        (
+            ForceTable,
+            {"deflection_m": [-1.0, 1.0, 0.0, 3.0, 4.0]},
+            {
+                "field": "deflection_m",
+                "value": "-1 to 4",
+                "allowed": "rising numbers from below 0 to above 0, with 0 itself",
+            },
+        ),
+        (
+            ForceTable,
+            {"deflection_m": [-1.0, 0.1, 2.0, 3.0, 4.0]},
+            {
+                "field": "deflection_m",
+                "value": "-1 to 4",
+                "allowed": "rising numbers from below 0 to above 0, with 0 itself",
+            },
+        ),
+        (ForceTable, {"deflection_m": [-1.0, 0.0, 1.0]}, {"says": "at-least-items", "field": "deflection_m"}),
+        (ForceTable, {"force_n": [0.0, 0.0]}, {"field": "force_n", "allowed": "5, one per deflection_m"}),
+        (ForceTable, {"force_n": [0.0, 0.0, 0.5, 0.0, 0.0]}, {"says": "force-n-at-deflection-allowed-is"}),
+        (DampingTable, {"damping_n_s_m": [0.0] * 4}, {"field": "damping_n_s_m", "allowed": "5, one per deflection_m"}),
+        (DampingTable, {"damping_n_s_m": [0.0, 1.0, -1.0, 0.0, 0.0]}, {"field": "damping_n_s_m.2", "value": -1.0}),
     ],
 )
 def test_a_table_that_cannot_be_is_refused(part, change, message):
@@ -128,12 +153,12 @@ def test_a_table_that_cannot_be_is_refused(part, change, message):
     kind = part.model_fields["kind"].annotation.__args__[0]
     table = {"kind": kind, "at": "p", "deflection_m": [-2.0, -1.0, 0.0, 1.0, 2.0], name: [0.0] * 5}
     part.model_validate(table)
-    with pytest.raises(ValueError, match=message):
+    with refused(ValueError, **message):
         part.model_validate(table | change)
 
 
 def test_a_table_too_steep_for_the_step_is_refused():
-    with pytest.raises(ValueError, match=r"`?elements\[0\]`?: its slope of .* N s/m at 'mass' is too steep"):
+    with refused(ValueError, field="elements[0]", allowed="up to 5000, or converter.substeps of at least 801"):
         oscillator(damping_table(lambda z: 1e6, UNEVEN))
-    with pytest.raises(ValueError, match=r"`?elements\[0\]`?: its slope of .* N/m at 'mass' is too steep"):
+    with refused(ValueError, field="elements[0]", allowed="up to 5e+07, or converter.substeps of at least 1960"):
         oscillator(force_table(lambda z: 1e18 * z**3))

@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 
 from simulators.structures.beam import BeamModes, Boundary, Lump, Spring, beam_modes
 from simulators.structures.structure import BeamStructure
+from tests.refused import refused
 
 LENGTH_M, STIFFNESS, MASS = 0.55, 184.0, 1.3
 PI = np.pi
@@ -157,19 +158,27 @@ def test_measured_frequencies_replace_the_computed_ones_and_the_shapes_stay() ->
 
 
 BAD = [
-    ({"boundary": "pinned"}, "boundary\n.*'pinned-pinned'"),
-    ({"supports": [{"at": "tip"}]}, r"supports.0\n.*stiffness_n_m = 0.0 .*allowed is one above 0"),
-    ({"supports": [{"at": "top", "stiffness_n_m": 1.0}]}, r"`supports\[0\].at` = 'top'; allowed: one of drive, tip"),
-    ({"supports": [{"at": "tip", "stiffness_n_m": -1.0}]}, "greater than or equal to 0"),
-    ({"lumped_masses": [{"at": "top", "mass_kg": 1.0}]}, r"`?lumped_masses\[0\].at`? = 'top'"),
-    ({"lumped_masses": [{"at": "tip", "mass_kg": -1.0}]}, "greater than or equal to 0"),
-    ({"frequency_hz": [40.0]}, "`?frequency_hz`?: has 1 values; allowed: 2"),
-    ({"n_element": 4, "damping_ratio": [0.01] * 9}, "has 9 modes; allowed: 1 to 8"),
-    ({"points_m": {"drive": 0.6}}, "`?points_m.drive`? = 0.6; allowed: 0 to length_m = 0.5"),
+    ({"boundary": "pinned"}, {"field": "boundary", "value": "pinned"}),
+    ({"supports": [{"at": "tip"}]}, {"says": "supports-stiffness-n-m-allowed-is", "field": "supports.0"}),
+    (
+        {"supports": [{"at": "top", "stiffness_n_m": 1.0}]},
+        {"field": "supports[0].at", "value": "top", "allowed": "one of drive, tip"},
+    ),
+    ({"supports": [{"at": "tip", "stiffness_n_m": -1.0}]}, {"says": "greater-than-or-equal-to", "value": -1.0}),
+    (
+        {"lumped_masses": [{"at": "top", "mass_kg": 1.0}]},
+        {"field": "lumped_masses[0].at", "value": "top", "allowed": "one of drive, tip"},
+    ),
+    ({"lumped_masses": [{"at": "tip", "mass_kg": -1.0}]}, {"says": "greater-than-or-equal-to", "value": -1.0}),
+    ({"frequency_hz": [40.0]}, {"field": "frequency_hz", "allowed": "2, one per damping_ratio"}),
+    ({"n_element": 4, "damping_ratio": [0.01] * 9}, {"field": "damping_ratio", "allowed": "1 to 8"}),
+    ({"points_m": {"drive": 0.6}}, {"field": "points_m.drive", "value": 0.6, "allowed": "0 to length_m = 0.5"}),
 ]
 
 
 @pytest.mark.parametrize(("change", "message"), BAD)
-def test_bad_beam_is_refused_with_the_field_and_what_is_allowed(change: dict[str, object], message: str) -> None:
-    with pytest.raises(ValidationError, match=message):
+def test_bad_beam_is_refused_with_the_field_and_what_is_allowed(
+    change: dict[str, object], message: dict[str, object]
+) -> None:
+    with refused(ValidationError, **message):
         BeamStructure.model_validate(TABLE | change)

@@ -140,18 +140,20 @@ TABLE: dict[str, Any] = {
     "sites_m": {"joint": 0.35},
 }
 BAD = [
-    ({"sites_m": {"joint": 0.2}}, "`?sites_m.joint`? = 0.2; allowed: the lap, 0.3 to 0.42"),
-    ({"bolts_m": [0.5]}, r"`?bolts_m\[0\]`? = 0.5(?: \S+)?; allowed: the lap"),
-    ({"lap_length_m": 0.8}, r"`?lap_length_m`? = 0.8(?: \S+)?; allowed: less than `length_m` = 0.72"),
-    ({"sites_m": {"drive": 0.35}}, "`?sites_m.drive`?: is also in points_m"),
-    ({"tangential_stiffness_n_m": -1.0}, "greater than or equal to 0"),
-    ({"damping_ratio": [0.01] * 99}, "has 99 modes; allowed: 1 to 40"),
+    ({"sites_m": {"joint": 0.2}}, {"field": "sites_m.joint", "value": 0.2, "allowed": "the lap, 0.3 to 0.42"}),
+    ({"bolts_m": [0.5]}, {"field": "bolts_m[0]", "value": 0.5, "allowed": "the lap, 0.3 to 0.42"}),
+    ({"lap_length_m": 0.8}, {"field": "lap_length_m", "value": 0.8, "allowed": "less than `length_m` = 0.72"}),
+    ({"sites_m": {"drive": 0.35}}, {"field": "sites_m.drive", "allowed": "a name of its own"}),
+    ({"tangential_stiffness_n_m": -1.0}, {"field": "tangential_stiffness_n_m", "value": -1.0}),
+    ({"damping_ratio": [0.01] * 99}, {"field": "damping_ratio", "allowed": "1 to 40"}),
 ]
 
 
 @pytest.mark.parametrize(("change", "message"), BAD)
-def test_bad_joint_is_refused_with_the_field_and_what_is_allowed(change: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValidationError, match=message):
+def test_bad_joint_is_refused_with_the_field_and_what_is_allowed(
+    change: dict[str, Any], message: dict[str, object]
+) -> None:
+    with refused(ValidationError, **message):
         LapJointedBeam.model_validate(TABLE | change)
 
 

@@ -221,7 +221,7 @@ def test_a_round_goes_over_the_levels_that_are_left():
 
 
 def test_levels_are_metres():
-    with pytest.raises(ValidationError, match="`levels_v`: a continuous backbone goes by the response"):
+    with refused(ValidationError, field="levels_v", allowed="levels_m"):
         plan_with(levels_m=None, levels_v=[0.1, 0.2])
 
 

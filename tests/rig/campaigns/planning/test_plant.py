@@ -248,9 +248,7 @@ def test_the_voltage_that_a_level_needs_is_that_of_the_lag_that_takes_most():
         update={"limits": bench.limits.model_copy(update={"voltage_v": limit, "acceleration_m_s2": 1e3})}
     )
     phases_for("response-controlled", [-90.0], levels_m=[9e-4])[0].check(bench)
-    with pytest.raises(
-        ConfigurationError, match=rf"`levels_m\[0\]` = .* needs [\d.]+ V at a lag of {at:g} deg on the known"
-    ):
+    with refused(ConfigurationError, field="levels_m[0]", reason=lambda text: f"V at a lag of {at:g} deg" in text):
         phases_for("response-controlled", lags, levels_m=[9e-4])[0].check(bench)
 
 
@@ -290,11 +288,9 @@ def test_a_plant_with_a_wrong_key_is_named():
 @pytest.mark.parametrize(("highest_hz", "spare"), [(1000.0, 2), (3000.0, 2), (2000.0, 1), (500000.0, 1)])
 def test_a_frequency_too_high_for_any_harmonic_is_named_with_the_highest_allowed(highest_hz, spare):
     plan, bench = load_plan("magnet-beam/backbone"), load_bench("magnet-beam")
-    with pytest.raises(
-        ConfigurationError, match=f"{highest_hz:g} Hz: is too high for 5000 samples/s.*up to (.*) Hz"
-    ) as caught:
+    with refused(ConfigurationError, field="highest frequency", value=highest_hz, unit="Hz") as caught:
         plan.check_evaluated(7, bench, highest_hz, spare)
-    allowed_hz = float(str(caught.value).split()[-2])
+    allowed_hz = float(caught.value.allowed.split()[-2])
     plan.check_evaluated(1, bench, allowed_hz, spare)
 
 

@@ -276,7 +276,7 @@ class _Fails(Silent):
 
 def test_a_failure_beside_the_loop_ramps_down_before_it_is_raised(tmp_path):
     output = tmp_path / "run.h5"
-    with pytest.raises(KeyError, match="a bug"):
+    with refused(KeyError, "a-bug"):
         run_plan(plan_with(), bench_with(), output, RunOptions(progress=_Fails()))
     with Recording(output) as recording:
         assert recording.parts[0].end["reason"] == "stop_requested"
@@ -294,7 +294,7 @@ class _FailsAtTheEnd(Silent):
 
 def test_a_failure_at_the_last_point_leaves_no_run_that_calls_itself_complete(tmp_path):
     output = tmp_path / "run.h5"
-    with pytest.raises(KeyError, match="a bug"):
+    with refused(KeyError, "a-bug"):
         run_plan(plan_with(levels_v=(0.4,)), bench_with(), output, RunOptions(progress=_FailsAtTheEnd()))
     with Recording(output) as recording:
         assert not recording.complete

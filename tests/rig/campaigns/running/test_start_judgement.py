@@ -11,6 +11,7 @@ from rig.campaigns.running.start_judgement import StartJudgement
 from rig.check.run import check
 from rig.emulator.emulated import emulated
 from rig.tick.layout import recorded_row
+from tests.refused import refused
 from tests.reliability.faults.plans import bench_for, plan_for
 from tests.rig.check.rewired import Rewiring, column, rewire, scaled
 from tests.rig.rigs import bench_with
@@ -146,7 +147,7 @@ def test_a_judgement_that_fails_ends_the_run_and_leaves_no_loop_waiting(tmp_path
         raise RuntimeError("for a test")
 
     monkeypatch.setattr(StartJudgement, "refusal_of_rows", fail)
-    with emulated(bench_for("m"), "serial") as far, pytest.raises(RuntimeError, match="for a test"):
+    with emulated(bench_for("m"), "serial") as far, refused(RuntimeError, "for-a-test"):
         run_plan(plan_for("m"), far, tmp_path / "run.h5", RunOptions())
 
 

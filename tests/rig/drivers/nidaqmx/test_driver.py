@@ -193,7 +193,7 @@ def test_an_error_while_running_ends_with_zero_on_the_output_and_its_code(chassi
         assert chassis.output_v != 0.0
         injection = Injection(call, code, after=3)
         chassis.server.calls.injections.append(injection)
-        with pytest.raises(DaqError, match=f"NI-DAQmx {code.value}: ") as caught:
+        with refused(DaqError, reason=lambda text: f"(NI-DAQmx {code.value}: " in text) as caught:
             driven(daq, 10)
         assert type(caught.value) is kind
         assert "\n" not in str(caught.value)
@@ -207,7 +207,7 @@ def test_an_error_while_opening_or_starting_has_its_code_and_leaves_nothing_rese
     kind, _ = BY_CODE[code.value]
     injection = Injection(call, code)
     chassis.server.calls.injections.append(injection)
-    with pytest.raises(DaqError, match=f"NI-DAQmx {code.value}: ") as caught:
+    with refused(DaqError, reason=lambda text: f"(NI-DAQmx {code.value}: " in text) as caught:
         begun(chassis)
     assert type(caught.value) is kind
     chassis.server.calls.injections.remove(injection)

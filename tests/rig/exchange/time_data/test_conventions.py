@@ -21,6 +21,7 @@ from identification import TimeRecords
 from rig.errors import RigError
 from rig.exchange.process import _READERS
 from rig.exchange.reading import import_file
+from tests.refused import refused
 from tests.rig.exchange.time_data.convention_writers import (
     MOTIONS,
     POUND,
@@ -143,7 +144,7 @@ def test_what_cannot_be_followed_is_refused_with_a_word(kind, write, words):
     ids=lambda v: getattr(v, "__name__", v),
 )
 def test_a_mapping_wins_against_the_units_of_a_file_only_by_saying_so(kind, write):
-    with pytest.raises(RigError, match="the file's own units make it"):
+    with refused(RigError, field="channels.f.unit", value="kN"):
         imported(write, ENDINGS[kind], EXAMPLE, force_unit="kN")
     found, _ = imported(write, ENDINGS[kind], EXAMPLE, force_unit="kN", more="against_file = true")
     factor = POUND if kind == "SEP005" else 1.0  # which is in SI by then
@@ -157,7 +158,7 @@ def test_stored_numbers_are_taken_against_the_scale_of_a_file():
 
 @pytest.mark.parametrize("unit", ["furlongs", "N", "Hz"])
 def test_a_unit_of_time_that_is_none_is_refused(unit):
-    with pytest.raises(RigError, match=f"time_unit.*: the file's own unit of the instants is '{unit}'"):
+    with refused(RigError, field="time_unit", reason=lambda text: text.endswith(f"'{unit}'")):
         imported(_with_time_in(unit), ".h5", EXAMPLE)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from rig.exchange.file_data import FileData
 from rig.exchange.foreign.labview import read_lvm
+from tests.refused import refused
 
 N, STEP = 50, 1.953125e-5
 VALUES = np.random.default_rng(2).normal(size=(N, 2))
@@ -91,15 +92,21 @@ def test_instants_that_are_no_even_steps_are_kept_and_give_no_rate(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a,b\n1,2\n", "does not begin with 'LabVIEW Measurement'"),
-        (head()[:60], "its head has no end"),
-        (head(), "no segment with numbers"),
-        (head() + segment(VALUES) + segment(VALUES[:20], begins=("11:00:00.0",) * 2), "unequal lengths with gaps"),
-        (head() + segment(VALUES).replace("Delta_X\t1.953125e-05", "Delta_X\tfast"), "fast"),
-        (head() + segment(VALUES).replace(f"{VALUES[3, 1]!r}".removeprefix("np.float64(")[:-1], "OVER"), "'OVER"),
-        (head() + segment(VALUES) + segment(VALUES).replace("\tN\t", "\tkN\t"), "another Y_Unit_Label"),
+        ("a,b\n1,2\n", {"says": "does-not-begin-with-labview-measurement"}),
+        (head()[:60], {"says": "its-head-has-no-end"}),
+        (head(), {"says": "no-segment-with-numbers"}),
+        (
+            head() + segment(VALUES) + segment(VALUES[:20], begins=("11:00:00.0",) * 2),
+            {"says": "unequal-lengths-with-gaps"},
+        ),
+        (head() + segment(VALUES).replace("Delta_X\t1.953125e-05", "Delta_X\tfast"), {"says": "fast"}),
+        (
+            head() + segment(VALUES).replace(f"{VALUES[3, 1]!r}".removeprefix("np.float64(")[:-1], "OVER"),
+            {"says": "over"},
+        ),
+        (head() + segment(VALUES) + segment(VALUES).replace("\tN\t", "\tkN\t"), {"says": "another-y-unit-label"}),
     ],
 )
 def test_what_cannot_be_read_is_named(tmp_path, text, message):
-    with pytest.raises(ValueError, match=message):
+    with refused(ValueError, **message):
         read(tmp_path, text)

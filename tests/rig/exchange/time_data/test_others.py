@@ -17,6 +17,7 @@ from rig.exchange.foreign.hdf5 import read_hdf5
 from rig.exchange.mat import parsed_mat
 from rig.exchange.process import main
 from rig.exchange.proposal.contents import contents_of
+from tests.refused import refused
 from tests.reliability.mutations.byte_mutations import BYTE_MUTATIONS
 from tests.rig.exchange.time_data import files
 from tests.rig.exchange.time_data.files import save_to_mat
@@ -42,7 +43,11 @@ def test_sheets_of_a_workbook_have_names_units_and_numbers(tmp_path):
 
 @pytest.mark.parametrize(
     ("cell", "message"),
-    [(None, "cell B7: is empty"), ("OVER", "cell B7: 'OVER' is no number"), (True, "cell B7: 'True'")],
+    [
+        (None, {"says": "cell-b-is-empty"}),
+        ("OVER", {"says": "cell-b-over-is-no-number"}),
+        (True, {"says": "cell-b-true"}),
+    ],
 )
 def test_a_cell_without_a_number_is_named(tmp_path, cell, message):
     book = openpyxl.Workbook()
@@ -50,13 +55,13 @@ def test_a_cell_without_a_number_is_named(tmp_path, cell, message):
         book.active.append(row)
     book.active["B7"] = cell
     book.save(tmp_path / "x.xlsx")
-    with pytest.raises(ValueError, match=message):
+    with refused(ValueError, **message):
         read_workbook(tmp_path / "x.xlsx")
 
 
 def test_an_archive_with_objects_is_refused_and_runs_nothing(tmp_path):
     np.savez(tmp_path / "x.npz", F=np.array([{"a": 1}], object))
-    with pytest.raises(ValueError, match="allow_pickle"):
+    with refused(ValueError, "allow-pickle"):
         read_npz(tmp_path / "x.npz")
 
 
@@ -108,9 +113,7 @@ def test_a_timetable_is_a_structure_of_its_variables_and_seconds(tmp_path, versi
 def test_without_mat_io_a_line_says_how_matlab_saves_it_readably(tmp_path, monkeypatch, version):
     save_to_mat(str(tmp_path / "x.mat"), {"data": table(None)}, version=version)
     monkeypatch.setitem(sys.modules, "matio", None)
-    with pytest.raises(
-        ValueError, match=r"'data' is a MATLAB timetable, .*vibrolock\[formats\].*table2struct\(timetable2table"
-    ) as caught:
+    with refused(ValueError, "data-is-a-matlab-timetable-vibrolock") as caught:
         parsed_mat(tmp_path / "x.mat")
     assert "\n" not in str(caught.value)
 

@@ -16,6 +16,7 @@ from rig.exchange.tables.guess import guessed_layout
 from rig.exchange.tables.reading import read_table
 from rig.exchange.tables.text import encoding_of
 from rig.system.text_files import open_regular
+from tests.refused import refused
 
 CHANCE = np.random.default_rng(5)
 VALUES = np.column_stack([np.arange(40) / 2048.0, CHANCE.normal(size=(40, 2))])
@@ -104,20 +105,20 @@ def test_numbers_are_the_same_with_the_compiled_parser_and_without(tmp_path_fact
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (("1,2", "3,", "4,5"), r"line 3, column 'b': is empty"),
-        (("1,2", "3,--", "4,5"), r"line 3, column 'b': '--' is no number"),
-        (("1,2", "3,OVER", "4,5"), r"line 3, column 'b': 'OVER' is no number"),
-        (("1,2", "3", "4,5"), r"line 3: 1 values for 2 names"),
-        (("1,2", "3,4,5", "4,5"), r"line 3: 3 values for 2 names"),
-        (("1,2", "3,4", "Max,5", "Mean,4"), r"line 4, column 'a': 'Max' is no number; .*skip_last_lines = 2"),
-        (('1,"2,5"', '3,"4,5"'), r"line 2, column 'b': '2,5' is no number; .*decimal = \",\""),
+        (("1,2", "3,", "4,5"), {"says": "line-column-b-is-empty"}),
+        (("1,2", "3,--", "4,5"), {"says": "line-column-b-is-no-number"}),
+        (("1,2", "3,OVER", "4,5"), {"says": "line-column-b-over-is-no"}),
+        (("1,2", "3", "4,5"), {"says": "line-values-for-names"}),
+        (("1,2", "3,4,5", "4,5"), {"says": "line-values-for-names-2"}),
+        (("1,2", "3,4", "Max,5", "Mean,4"), {"says": "line-column-a-max-is-no"}),
+        (('1,"2,5"', '3,"4,5"'), {"says": "line-column-b-is-no-number-2"}),
     ],
 )
 def test_what_is_no_number_is_named_with_line_and_column(tmp_path, monkeypatch, pandas, lines, message):
     if not pandas:
         monkeypatch.setitem(sys.modules, "pandas", None)
     (tmp_path / "x.csv").write_text("\n".join(["a,b", *lines]) + "\n")
-    with pytest.raises(ImportFailed, match=message) as caught:
+    with refused(ImportFailed, **message) as caught:
         read_table(tmp_path / "x.csv")
     assert "x.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -153,7 +154,7 @@ def test_noise_is_no_text(tmp_path):
     chance = Random(3)
     for _ in range(20):
         (tmp_path / "x.csv").write_bytes(chance.randbytes(3000))
-        with pytest.raises(ImportFailed, match="is no text in"):
+        with refused(ImportFailed, "is-no-text-in"):
             encoding_of(tmp_path / "x.csv")
     with open_regular(tmp_path / "x.csv", 10_000) as stream:
         assert len(stream.read()) == 3000

@@ -17,6 +17,7 @@ from rig.exchange.proposal.contents import Leaf
 from rig.exchange.proposal.proposal import _check_clocks
 from rig.exchange.tables.guess import guessed_layout
 from rig.exchange.tables.reading import read_table
+from tests.refused import refused
 
 ROWS = np.column_stack([np.arange(40) / 2.048, np.random.default_rng(3).normal(size=(40, 2))])
 
@@ -128,5 +129,5 @@ def test_units_of_tdms_may_have_other_names(tmp_path):
 def test_instants_of_two_rates_in_one_file_are_refused():
     one, two = Leaf("t1 [s]", ROWS[:, 0] * 1e-3, "s"), Leaf("t2 [ms]", ROWS[:, 0] * 2.0, "ms")
     _check_clocks([one, Leaf("t2 [ms]", ROWS[:, 0] + 5.0, "ms")])
-    with pytest.raises(ImportFailed, match=r"'t1 \[s\]' have 2048 Hz, 't2 \[ms\]' have 1024 Hz"):
+    with refused(ImportFailed, "t-s-have-hz-t-ms"):
         _check_clocks([one, two])

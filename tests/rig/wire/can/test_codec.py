@@ -13,6 +13,7 @@ from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import Frame
 from rig.wire.can.protocol import protocol
 from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
+from tests.refused import refused
 
 BUSES = [(4, True, 1), (4, True, 10), (4, False, 1), (4, False, 5), (9, False, 3), (40, True, 7), (2, True, 33)]
 BEAT = Heartbeat(int(DeviceState.ARMED), 0, 7, 0)
@@ -241,13 +242,13 @@ def test_two_frames_that_contradict_each_other_spoil_their_block() -> None:
 def test_what_frames_cannot_carry_is_refused() -> None:
     device, _ = ends(4, False, 1)
     for stream, error, said in (
-        (Stream(4, 33, 100.0), DaqRefused, "`block` = 33: allowed over classical CAN with 4 channels is 1 to 32"),
-        (Stream(4, 1, 100.0, 32), DaqRefused, "counts of 32 bits: allowed over CAN is 16"),
-        (Stream(5, 1, 100.0), DaqMismatch, "5 channels, but the bus is defined for 4"),
+        (Stream(4, 33, 100.0), DaqRefused, {"field": "block", "value": 33}),
+        (Stream(4, 1, 100.0, 32), DaqRefused, {"says": "counts-of-bits-allowed-over-can"}),
+        (Stream(5, 1, 100.0), DaqMismatch, {"says": "channels-but-the-bus-is-defined"}),
     ):
-        with pytest.raises(error, match=said):
+        with refused(error, **said):
             device.configure(stream)
-    with pytest.raises(DaqRefused, match="before the stream is configured"):
+    with refused(DaqRefused, "before-the-stream-is-configured"):
         CanCodec(protocol(4, True, 1), True, {}).encode(Samples(0, np.zeros((1, 4), np.int16)))
 
 

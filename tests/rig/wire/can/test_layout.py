@@ -13,6 +13,7 @@ import rig.wire.can
 from rig.errors import ConfigurationError, DaqRefused
 from rig.wire.can.layout import compile_layout, compile_text
 from rig.wire.can.protocol import definition, protocol, shape_of
+from tests.refused import refused
 
 FOLDER = Path(rig.wire.can.__file__).parent
 SHIPPED = {
@@ -85,23 +86,26 @@ def test_other_files_with_floats_and_big_endian_signals_decode_as_cantools_does(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (message("x : 3|8@1+"), "message M, signal x: starts at bit 3"),
-        (message("x : 0|12@1+"), "message M, signal x: has 12 bits"),
+        (message("x : 3|8@1+"), {"says": "message-m-signal-x-starts-at"}),
+        (message("x : 0|12@1+"), {"says": "message-m-signal-x-has-bits"}),
         (
             message("x m0 : 0|8@1+").replace("SG_", 'SG_ s M : 8|8@1+ (1,0) [0|0] "" B\n SG_', 1),
-            "message M: is multiplexed",
+            {"says": "message-m-is-multiplexed"},
         ),
-        (message("x : 0|8@1+").replace("BO_ 7", f"BO_ {7 + (1 << 31)}"), "message M: has an identifier of 29 bits"),
-        ("nothing of the kind", "is not a DBC file"),
+        (
+            message("x : 0|8@1+").replace("BO_ 7", f"BO_ {7 + (1 << 31)}"),
+            {"says": "message-m-has-an-identifier-of", "allowed": "11", "where": "definition: message M"},
+        ),
+        ("nothing of the kind", {"says": "is-not-a-dbc-file"}),
     ],
 )
-def test_what_cannot_be_compiled_is_named(text: str, said: str) -> None:
-    with pytest.raises(ConfigurationError, match=said):
+def test_what_cannot_be_compiled_is_named(text: str, said: dict[str, object]) -> None:
+    with refused(ConfigurationError, **said):
         compile_text(text)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"none\.dbc"):
+    with refused(ConfigurationError, "none-dbc"):
         compile_layout(tmp_path / "none.dbc")
 
 
@@ -126,19 +130,23 @@ def test_a_definition_of_ones_own_may_move_identifiers_and_nothing_else(tmp_path
     path.write_text(definition(4, True, 1).replace("BO_ 64 OutputIndex", "BO_ 80 OutputIndex"))
     assert protocol(4, True, 3, path).version == 1
     for old, new, said in (
-        ("BO_ 80 OutputPeriod", "BO_ 80 Other", "message OutputPeriod is missing"),
-        ("BO_ 64 OutputIndex", "BO_ 65 OutputIndex", "message OutputIndex: .* multiples of 16"),
-        ("sample_3 :", "sample_x :", "message Readback: is .*sample_x"),
-        ("BO_ 64 OutputIndex", "BO_ 64 Other", "message OutputIndex is missing"),
+        ("BO_ 80 OutputPeriod", "BO_ 80 Other", {"says": "message-outputperiod-is-missing"}),
+        (
+            "BO_ 64 OutputIndex",
+            "BO_ 65 OutputIndex",
+            {"says": "message-outputindex-multiples-of", "allowed": "multiples of 16, for nodes"},
+        ),
+        ("sample_3 :", "sample_x :", {"says": "message-readback-is-sample-x"}),
+        ("BO_ 64 OutputIndex", "BO_ 64 Other", {"says": "message-outputindex-is-missing"}),
     ):
         path.write_text(definition(4, True).replace(old, new))
-        with pytest.raises(ConfigurationError, match=said):
+        with refused(ConfigurationError, **said):
             protocol(4, True, 3, path)
 
 
 def test_channels_that_fit_no_frames_are_refused() -> None:
     for n_channels, fd in ((0, True), (249, True), (17, False)):
-        with pytest.raises(DaqRefused, match=f"{n_channels} channels: allowed over"):
+        with refused(DaqRefused, reason=lambda text, n=n_channels: text.startswith(f"{n} channels: allowed over")):
             shape_of(n_channels, fd)
 
 

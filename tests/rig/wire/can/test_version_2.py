@@ -12,6 +12,7 @@ from rig.wire.can.frames import Frame
 from rig.wire.can.readbacks import Readbacks
 from rig.wire.messages import Output, Readback, Samples, Stream
 from tests.firmware.events import protocol_of
+from tests.refused import refused
 
 RATE_HZ = 1000.0
 EVERY = 10  # samples in 10 ms
@@ -203,7 +204,7 @@ def test_version_1_sends_and_understands_neither(fd: bool) -> None:
         assert end.decode(next(frame for frame in frames if frame.identifier == 0x063)) is None
         assert end._counters["foreign_frames"] == 2
         if end._device:
-            with pytest.raises(DaqRefused, match="version 2"):
+            with refused(DaqRefused, "version"):
                 end.encode(Readback(0, counts_of(0, 3)))
         else:
             assert not told(end.encode(output(0, 3, 20 << 16)))

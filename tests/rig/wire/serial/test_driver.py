@@ -37,7 +37,7 @@ def test_samples_come_over_the_line_and_nothing_is_lost(bench):
 
 def test_a_port_in_use_is_busy_and_free_again_afterwards(bench):
     for _ in range(2):
-        with make_daq(bench), pytest.raises(DaqBusy, match=bench.driver.options["port"]):
+        with make_daq(bench), refused(DaqBusy, where=f"port {bench.driver.options['port']!r}"):
             make_daq(bench).open()
 
 

@@ -132,7 +132,7 @@ def test_a_port_can_be_opened_again_and_closed_twice(line, ends):
 
 
 def test_a_port_that_somebody_holds_is_busy(line, ends):
-    with pytest.raises(DaqBusy, match=f"'{line.path}': somebody else holds it"):
+    with refused(DaqBusy, where=f"port {line.path!r}", hint="close the other program"):
         SerialLink.port(line.path, BAUD).open()
 
 
@@ -168,7 +168,7 @@ def test_a_port_that_another_process_holds_is_busy(line):
 
 @pytest.mark.parametrize("path", ["/dev/null", "/dev"])
 def test_what_is_no_serial_port_is_refused(path):
-    with pytest.raises(DaqRefused, match=f"'{path}'"):
+    with refused(DaqRefused, reason="it is no serial port", where=f"port {path!r}"):
         SerialLink.port(path, BAUD).open()
 
 
@@ -242,7 +242,7 @@ def test_nothing_stays_unread_when_much_comes_at_a_time(ends):
 def test_an_unplugged_cable_is_said_by_reading_and_by_writing(line, ends):
     host, _ = ends
     line.close()
-    with pytest.raises(DaqDisconnected, match=f"{line.path}: the port is gone"):
+    with refused(DaqDisconnected, "the-port-is-gone", where=line.path):
         host.receive(PATIENCE_S)
     with refused(DaqDisconnected, "unplugged"):
         host.send(Request(1, 1))

@@ -42,7 +42,7 @@ def test_what_is_missing_or_another_is_named_with_its_source(tmp_path):
         found(DATA, tmp_path)
     (tmp_path / "a.mat").write_bytes(b"shortened")
     digest = hashlib.sha256(b"shortened").hexdigest()
-    with pytest.raises(RecordingError, match=rf"a\.mat: is another file or another version: its SHA-256 is {digest}"):
+    with refused(RecordingError, where=str(tmp_path / "a.mat"), reason=lambda text: digest in text):
         found(DATA, tmp_path)
 
 

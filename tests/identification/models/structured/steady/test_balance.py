@@ -11,6 +11,7 @@ from identification.models.structured.model import workspace_for
 from identification.models.structured.steps import run
 from tests.identification.models.pnlss.steady.oscillators import shaker
 from tests.identification.models.structured.steady.beams import beam, friction, settled, smooth
+from tests.refused import refused
 
 RATE_HZ = 16000.0
 
@@ -140,16 +141,20 @@ def test_multipliers_are_those_of_a_simulated_period():
 
 def test_unknown_settings_are_refused_in_a_line():
     for options, message in (
-        ({"harmonics": 0}, "`harmonics` = 0; allowed: 1 and above"),
-        ({"samples": 10}, "`samples` = 10; allowed: at least 15 for 7 harmonics"),
-        ({"force": "fundamental"}, "'fundamental' of a model driven by a force needs an exciter"),
+        ({"harmonics": 0}, {"field": "harmonics", "value": 0, "allowed": "1 and above"}),
+        ({"samples": 10}, {"field": "samples", "value": 10, "allowed": "at least 15 for 7 harmonics"}),
+        ({"force": "fundamental"}, {"says": "fundamental-of-model-driven-by-force", "field": "force"}),
         (
             {"exciter": shaker(), "force": "pure-sine"},
-            "exciter`: makes harmonics of the force; leave it out for 'pure-sine'",
+            {
+                "says": "makes-harmonics-of-the-force-leave",
+                "field": "exciter",
+                "hint": "leave it out for 'pure-sine'",
+            },
         ),
-        ({"band_hz": (30.0, 20.0)}, "band_hz: is 30 to 20 Hz"),
+        ({"band_hz": (30.0, 20.0)}, {"field": "band_hz", "allowed": lambda text: text.startswith("rising")}),
     ):
-        with pytest.raises(IdentificationError, match=message):
+        with refused(IdentificationError, **message):
             harmonic_response(smooth(), 1.0, **options)
 
 
