@@ -36,7 +36,7 @@ def check_stored_values(part: Part, where: str) -> None:
         where_it_is = [event.get(key) for key in ("row", "sample", "stride")]
         if event.get("what") == "telemetry" and None in where_it_is:
             raise RecordingError(
-                f"{where}: events[{number}]: allowed is an event telemetry with row, sample and stride"
+                where=where, field=f"events[{number}]", allowed="an event telemetry with row, sample and stride"
             )
 
 

@@ -62,7 +62,7 @@ def test_what_is_refused_names_gains_delay_and_what_is_allowed():
             "force_proportional = 0.3, ",
         ),
         ({"force_loop": "through-response", "response_integral_per_s": 100.0}, AmplitudeLaw.FORCE_RMS, "response_"),
-        ({"response_integral_per_s": 100.0}, AmplitudeLaw.RESPONSE, "response_integral_per_s = 100`: 100 ms"),
+        ({"response_integral_per_s": 100.0}, AmplitudeLaw.RESPONSE, "response_integral_per_s = 100"),
         ({"force_loop": "linear", "k3": 50.0, "k4": 50.0, "response_integral_per_s": 100.0}, AmplitudeLaw.FORCE, None),
         ({"response_integral_per_s": 100.0, "force_integral_per_s": 100.0}, AmplitudeLaw.VOLTAGE, None),
     ],
@@ -73,5 +73,5 @@ def test_only_the_loops_in_use_are_judged(changes, amplitude_law, named):
     if named is None:
         law.check_delay(0.1, amplitude_law)
         return
-    with pytest.raises(InputError, match=f"^`{named}"):
+    with refused(InputError, field=lambda text: text.startswith(named)):
         law.check_delay(0.1, amplitude_law)

@@ -21,6 +21,7 @@ from simulators.analysis import NotConvergedError, phase_resonance_backbone
 from simulators.structures.structure import BeamStructure
 from tests.reference.harmonic_balance import backbone as reference_backbone, response_to_voltage
 from tests.reference.parameters import ONE_SIDED
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 
 BENCHES = ("magnet-beam", "magnet-beam-symmetric", "friction-beam")
@@ -281,9 +282,7 @@ def test_a_voltage_beyond_the_amplifier_is_said_and_ends_the_default_levels():
 def test_a_bench_that_may_not_be_driven_at_resonance_at_all_says_what_forbids_it():
     bench = bench_with({"limits": {"displacement_m": 1e-9}})
     lowest = f"already at {0.01 * bench.limits.voltage_v:g} V the bench may not be driven at resonance"
-    with pytest.raises(
-        ConfigurationError, match=rf"^{lowest} \(displacement reaches \S+ m and is in 1 of 1 points [^;]*\)$"
-    ):
+    with refused(ConfigurationError, "displacement-in-one-point-alone", reason=lambda text: text.startswith(lowest)):
         backbone(subject_of(bench))
 
 

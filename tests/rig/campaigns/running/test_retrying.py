@@ -55,10 +55,7 @@ def test_the_end_says_at_which_level_it_tripped_what_the_cause_was_and_what_to_d
 def test_the_level_that_tripped_is_not_tried_again_unasked(output):
     before = output.read_bytes()
     level = f"{level_of(output):g} V"
-    said = (
-        rf"^run\.h5: the run tripped at {level} \(displacement .*: `plan` with levels below {level}, or `retry_tripped`"
-    )
-    with pytest.raises(ConfigurationError, match=said):
+    with refused(ConfigurationError, "retry-tripped", reason=lambda text: f"`plan` with levels below {level}" in text):
         rig.resume(output)
     with refused(ConfigurationError, "retry-tripped"):
         rig.resume(output, plan=plan_with(levels_v=(0.4, 0.5, level_of(output) + 0.1)))
