@@ -47,7 +47,6 @@ def loop() -> Iterator[Ratio]:
     measured = _json("benchmarks.loop", "--json")
     for bench in (name for name in measured if name != "starting"):
         found = measured[bench]
-        yield Ratio(f"Runge-Kutta with 8 sub-steps, {bench}", "fused loop", found["rk4_over_fused"])
         yield Ratio(f"integrator, {bench}", "fused loop", found["share_of_integrator"])
         yield Ratio(f"tick, {bench}", "fused loop", found["share_of_tick"])
         yield Ratio(f"exchange in blocks of 64, {bench}", "fused loop", found["exchange_64_over_fused"])
@@ -92,7 +91,6 @@ def pnlss() -> Iterator[Ratio]:
         for size, found in sizes.items():
             what = f"PNLSS iteration, {size}, {threads}"
             yield Ratio(what, "dsyrk of its Jacobian's size, wall time", found["wall_over_syrk"])
-            yield Ratio(f"plain numpy, {size}, {threads}", "PNLSS iteration", found["times_plain_numpy"])
 
 
 def tables() -> Iterator[Ratio]:

@@ -1,13 +1,11 @@
 """Seconds per iteration of a nonlinear state-space fit: ``python -m benchmarks.pnlss_iteration [--json]``.
 
 Each case runs some iterations of `fit_pnlss` and takes their median; all that belongs to an iteration is in it: sensitivities,
-normal equations, their decomposition, and the simulations that try dampings. There are two baselines in the same run. One is
-the product of a Jacobian of that size with itself by the machine's own ``dsyrk`` on one core: what a fit costs at least that
-multiplies derivatives of outputs. Its ratio is that of processor times, which tell more than wall times on a busy machine. The
-other is what one writes first in numpy: the recursion sample by sample, the whole Jacobian, its product; on a short piece,
-scaled to the samples of the case. A fit is there when it is nearer to the data than the system that made them, noise added;
-NaN for one that is not. Memory is the peak of the process after each case, the data themselves included. Each number of
-threads has a process of its own.
+normal equations, their decomposition, and the simulations that try dampings. The baseline in the same run is the product of a
+Jacobian of that size with itself by the machine's own ``dsyrk`` on one core: what a fit costs at least that multiplies
+derivatives of outputs. Its ratio is that of processor times, which tell more than wall times on a busy machine. A fit is there
+when it is nearer to the data than the system that made them, noise added; NaN for one that is not. Memory is the peak of the
+process after each case, the data themselves included. Each number of threads has a process of its own.
 """
 
 import os
@@ -25,8 +23,6 @@ from scipy.linalg.blas import dsyrk
 from benchmarks.frame import show
 from identification import Channel, Experiment, Features, FitSettings, PnlssModel, StateSpace, fit_pnlss
 
-PIECE = 400
-"""Samples of the baseline."""
 CASES = {
     "4 states, 4 outputs, 400 coefficients, 25 600": (4, 4, 25_600, True, 7),
     "the same, 256 000": (4, 4, 256_000, True, 3),
@@ -74,27 +70,6 @@ def measured(true: PnlssModel, samples: int) -> Experiment:
     )
 
 
-def plain(model: PnlssModel, experiment: Experiment) -> float:
-    """Seconds per sample of the Jacobian and its product in plain numpy."""
-    n, outputs = model.states, len(model.outputs)
-    wide, own = n + 1 + model.state_features.count, n + 1 + model.output_features.count
-    begin = time.perf_counter()
-    states = model.simulate(experiment.inputs[:, :PIECE]).states
-    v = np.vstack([states, experiment.inputs[:, :PIECE]])
-    z, q = np.vstack([v, model.state_features.values(v)]), np.vstack([v, model.output_features.values(v)])
-    by_state = model.a[:, :, None] + np.einsum("if,fjk->ijk", model.e, model.state_features.derivatives(v)[:, :n])
-    by_output = model.c[:, :, None] + np.einsum("if,fjk->ijk", model.f, model.output_features.derivatives(v)[:, :n])
-    s = np.zeros((n, n * wide))
-    jacobian = np.zeros((PIECE, outputs, n * wide + outputs * own))
-    for k in range(PIECE):
-        jacobian[k, :, : n * wide] = by_output[:, :, k] @ s
-        jacobian[k, :, n * wide :] = np.kron(np.eye(outputs), q[:, k])
-        s = by_state[:, :, k] @ s + np.kron(np.eye(n), z[:, k])
-    rows = jacobian.reshape(-1, jacobian.shape[2])
-    rows.T @ rows
-    return (time.perf_counter() - begin) / PIECE
-
-
 def syrk(model: PnlssModel, samples: int) -> float:
     """Processor seconds of the product with itself of the derivatives that outputs share, block by block."""
     columns = model.states * (model.states + 1 + model.state_features.count)
@@ -117,7 +92,6 @@ def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool, it
     start, true = system(states, outputs, nonlinear_outputs)
     experiment = measured(true, samples)
     fit_pnlss(start, [measured(true, 3000)], settings=FitSettings(iterations=1))  # compiles
-    baseline = min(plain(true, experiment) for _ in range(3)) * samples
     product, processor = [syrk(true, samples) for _ in range(3)], [time.process_time()]
     fit = fit_pnlss(
         start,
@@ -136,8 +110,6 @@ def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool, it
         "best": float(np.min(seconds)),
         "syrk": statistics.median(product),
         "seconds_until_there": float(fit.history.seconds[there[0]]) if there.size else float("nan"),
-        "plain_numpy": baseline,
-        "times_plain_numpy": baseline / statistics.median(seconds),
         "training_error": fit.training_error,
         "data_mb": (experiment.inputs.nbytes + experiment.outputs.nbytes) / 1e6,
         "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3,

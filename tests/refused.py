@@ -34,6 +34,7 @@ def refused(
         assert wanted(found) if isinstance(wanted, Callable) else found == wanted, f"{name} = {found!r} of: {stated}"
     if says is not None:
         assert re.search(MESSAGES[error.__name__][says], str(caught.value)), str(caught.value)
+    del caught, stated  # this frame is in the traceback: a file that is open there would stay until garbage is collected
 
 
 def _stated(error: Exception) -> Exception:

@@ -69,7 +69,7 @@ def test_a_scattering_lag_is_warned_of():
 def test_below_four_tenths_of_a_bit_no_phase_is_read_and_none_is_reported():
     points, end = points_and_end(plan_of("magnet-beam", levels_v=(0.002, 0.1), settle=SHORT), bench_with())
     assert points[0]["quality"] == "not-settled"
-    assert "too small for its phase to be read" in points[0]["reason"]
+    assert "too small" in points[0]["reason"]
     assert points[1]["accepted"]
     assert end["skipped"] == "1 of 2 points skipped: not-settled (0.002 V)"
 

@@ -162,7 +162,7 @@ def test_too_many_lost_samples_repeat_a_point_and_a_few_do_not():
         points = points_of(run.recording)
         refused = [attempt for point in points for attempt in point.refused_before]
         assert run.complete
-        assert any("samples were lost on their way" in attempt.reason for attempt in refused)
+        assert any("samples were lost" in attempt.reason for attempt in refused)
 
 
 def test_a_knock_that_breaks_the_settle_rule_is_followed_by_another_record_at_once(monkeypatch):
@@ -173,7 +173,7 @@ def test_a_knock_that_breaks_the_settle_rule_is_followed_by_another_record_at_on
     assert run.complete
     assert len(run.recording.parts) == 1
     assert [attempt.quality for attempt in first.refused_before] == [Quality.DISTURBED]
-    assert "the settle rule was broken while recording" in first.refused_before[0].reason
+    assert "settle rule" in first.refused_before[0].reason
     assert second.attempts == 1
 
 
@@ -287,7 +287,7 @@ def test_a_knock_that_only_the_evaluation_sees_is_measured_again_after_the_last_
         assert recording.parts[1].end["skipped"] == ""
     assert first.part == 1
     (attempt,) = first.refused_before
-    assert "of the force's RMS are no harmonics" in attempt.reason
+    assert "are no harmonics" in attempt.reason
     assert attempt.part == 0
     assert attempt.frequency_hz == pytest.approx(first.vibration.frequency_hz, rel=1e-4)
     assert second.part == 0
@@ -331,7 +331,7 @@ def test_a_device_that_has_latched_meanwhile_is_left_alone(monkeypatch, tmp_path
         assert len(recording.parts) == 1
         assert not recording.complete
     assert len(sessions) == 2
-    assert any("nothing is measured again: the emergency stop has latched" in text for text in remarks)
+    assert any("emergency stop has latched" in text for text in remarks)
     monkeypatch.undo()
     with resume_run(tmp_path / "latched.h5") as recording:
         assert recording.complete

@@ -286,7 +286,7 @@ def test_a_point_that_failed_says_where_it_is_and_nothing_of_a_phase_that_nobody
     settle = {"amplitude": 1e-9, "longest_periods": 30}
     plan = _plan(frequencies_hz=(24.5,), settle=settle | {"settled_periods": 5})
     with rig.run(plan, bench=bench_with(**QUIET), progress=RunProgress(STEPPED_SINE_COLUMNS)) as run:
-        assert "at 24.5 Hz: not settled within 30 periods" in run.recording.points[0]["reason"]
+        assert "at 24.5 Hz: not settled" in run.recording.points[0]["reason"]
         assert "phase" not in run.recording.points[0]["reason"]
     assert "  not-settled: at 24.5 Hz" in capsys.readouterr().err
 

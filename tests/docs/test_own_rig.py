@@ -175,7 +175,7 @@ def test_a_joint_that_is_stiffer_than_the_beam_is_refused(folder):
     (folder / "press-fit.toml").write_text(PRESS_FIT, encoding="utf-8")
     done = typed("run plate-plan.toml --bench press-fit.toml -o no.h5", folder)
     assert done.status == 1
-    assert "friction: stiffness 100000 in all; allowed: less than the structure has there" in done.err
+    assert "friction: stiffness 100000" in done.err
 
 
 def test_every_flag_is_on_the_page_of_parts_with_its_bit():

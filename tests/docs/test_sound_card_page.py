@@ -75,7 +75,7 @@ def test_the_commands_of_the_page_lead_from_the_devices_to_a_figure_and_to_a_cal
     (emulate,), (emulate_cables,) = commands("runs until Ctrl-C")
     (listing, run, plot), (calibrate,) = commands("needs the emulated card")
     with emulated_card(emulate):
-        assert "structure (JACK Audio Connection Kit): 5 inputs, 1 outputs, 48000 Hz" in ended(listing)
+        assert "5 inputs, 1 outputs, 48000 Hz" in ended(listing)
         assert "of 13 points accepted" in interrupted_after_a_point(run)
         ended(plot)
     assert (tmp_path / "backbone.png").read_bytes().startswith(b"\x89PNG")

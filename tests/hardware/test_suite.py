@@ -82,8 +82,8 @@ def test_what_a_bench_has_not_is_skipped_with_the_reason_and_a_failed_test_leave
     assert [found[name][0] for name in sorted(found)] == ["skipped", "skipped", "passed", "failed", "passed"], (
         done.stdout
     )
-    assert "needs channel 'acc_nowhere', it has force, drive, acc_drive, acc_magnet" in found["test_a"][1]
-    assert "needs something physical, this one is virtual" in found["test_b"][1]
+    assert "needs channel 'acc_nowhere'" in found["test_a"][1]
+    assert "needs something physical" in found["test_b"][1]
 
 
 def test_the_plug_in_costs_nothing_at_import():

@@ -42,7 +42,7 @@ def test_a_mode_near_twice_the_frequency_of_another_is_refused_if_it_is_named(se
 def test_a_mode_near_twice_the_frequency_of_another_does_not_disturb_it_and_is_noted():
     found = decay_backbone(two_modes(30.0), CHANNELS, sample_rate_hz=RATE_HZ)
     assert len(found.modes) == 1
-    assert any("harmonic 2 of the mode at 15 Hz" in note for note in found.notes)
+    assert any("harmonic 2 of the mode" in note for note in found.notes)
     np.testing.assert_allclose(found.mode().modal_frequency_hz[:8], 15.0, rtol=1e-5)
     np.testing.assert_allclose(found.mode().damping_ratio[:8], 0.003, rtol=2e-3)
 

@@ -45,7 +45,7 @@ def test_force_controlled_points_of_the_magnet_beams_lie_on_their_backbone(speci
     assert np.isfinite(frequency).sum() >= 8
     assert np.nanmax(np.abs(frequency)) < 6e-5
     assert np.nanmax(np.abs(damping)) < 5e-3
-    assert any("more than 30 deg from phase resonance" in note for note in mode.notes)
+    assert any("more than 30 deg" in note for note in mode.notes)
 
 
 def test_on_the_friction_beam_both_sides_of_resonance_cancel_the_other_modes() -> None:
@@ -61,7 +61,7 @@ def test_on_the_friction_beam_both_sides_of_resonance_cancel_the_other_modes() -
 
 def test_points_far_from_resonance_are_left_out_and_none_at_all_is_refused() -> None:
     mode = single_point_mode([level()], 1.0)
-    assert "points left out: too far from phase resonance" in mode.notes[1]
+    assert "points left out" in mode.notes[1]
     with refused(IdentificationError, "none-of-points-lies-within-deg", field="responses"):
         single_point_mode([level(f_hz=np.linspace(60.0, 61.0, 10))], 1.0)
     with refused(IdentificationError, field="phase_window_deg", value=90, allowed="above 0 to 80"):

@@ -104,7 +104,7 @@ def test_few_lags_are_enough_and_their_uncertainty_covers_the_truth(lags_deg: li
 def test_a_window_that_was_widened_is_said_and_points_within_it_keep_others_out() -> None:
     lags = [27.0, 58.0, 90.0, 122.0, 153.0]
     mode = stepped_sine_mode([level(f_hz=at_lags(lags)), level()])
-    assert any("1 of 2 levels have fewer than 5 points within 60 deg" in note for note in mode.notes)
+    assert any("fewer than 5 points" in note for note in mode.notes)
     assert any("points up to 63 deg away" in note for note in mode.notes)
     spoilt = level(f_hz=at_lags([10.0, 40.0, 60.0, 90.0, 120.0, 140.0]))
     force = spoilt.force.copy()

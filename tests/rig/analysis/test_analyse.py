@@ -268,7 +268,7 @@ def test_where_nothing_at_all_is_found_one_line_says_so(command, monkeypatch):
 
 def test_leaving_the_valid_range_is_said():
     found = backbone(subject_of("magnet-beam"), lowest=5.0, highest=15.0, points=2)
-    assert any("beyond the range in which its law holds" in note for note in found.notes)
+    assert any("beyond the range" in note for note in found.notes)
 
 
 def test_a_voltage_beyond_the_amplifier_is_said_and_ends_the_default_levels():
@@ -276,7 +276,7 @@ def test_a_voltage_beyond_the_amplifier_is_said_and_ends_the_default_levels():
     found = backbone(subject_of(bench), points=2)
     assert 0.4 < found.responses.voltage_v[-1] <= 0.5
     beyond = backbone(subject_of(bench), by="voltage", lowest=0.4, highest=0.8, points=2)
-    assert any("the amplifier's limit of 0.5 V" in note for note in beyond.notes)
+    assert any("limit of 0.5 V" in note for note in beyond.notes)
 
 
 def test_a_bench_that_may_not_be_driven_at_resonance_at_all_says_what_forbids_it():

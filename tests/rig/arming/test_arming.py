@@ -181,19 +181,16 @@ def test_a_run_is_compared_with_the_scale_of_the_last_check_and_says_once_where_
 
     never = about("never.h5")
     assert "checked" not in never
-    assert (
-        sum("the scale of force and motion is unproven: the bench was never checked" in r for r in never["remarks"])
-        == 1
-    )
+    assert sum("never checked" in r for r in never["remarks"]) == 1
     found = check(bench(), tmp_path / "check.h5", RunOptions(arm=True))
     checked = about("checked.h5")
     assert checked["checked"] == asdict(found.scale)
     assert not any("unproven" in remark for remark in checked["remarks"])
     remember(bench(), check=passed(bench()))  # as an earlier version kept it
     earlier = about("earlier.h5")
-    assert any("the last check kept no numbers of it" in remark for remark in earlier["remarks"])
+    assert any("kept no numbers" in remark for remark in earlier["remarks"])
     remember(bench(), check=replace(passed(bench()), fingerprint="of another device", scale=found.scale))
-    assert any("the last check was of other channels" in remark for remark in about("other.h5")["remarks"])
+    assert any("other channels" in remark for remark in about("other.h5")["remarks"])
 
 
 def test_a_memory_of_an_earlier_version_has_no_scale(state):
@@ -214,7 +211,7 @@ def test_a_bench_without_another_shape_says_that_the_phase_of_the_drive_sensor_i
     alone = bench_with({"name": "beam next door", "block": 50, "channels": channels})
     with rig.run(PLAN, bench=alone, output=tmp_path / "run.h5", arm=True) as run:
         remarks = run.recording.parts[-1].information["about"]["remarks"]
-    assert sum("the phase of drive is unproven" in remark for remark in remarks) == 1
+    assert sum("phase of drive" in remark for remark in remarks) == 1
 
 
 @pytest.mark.usefixtures("physical")
@@ -325,8 +322,8 @@ def test_a_person_who_is_told_that_the_output_outlives_the_host_may_arm(monkeypa
     monkeypatch.setattr("sys.stdin", io.StringIO("beam next door\n"))
     with rig.run(PLAN, bench=bench(), arm=ask) as run:
         assert armed(run)["how"] == "person"
-        assert "hardware emergency stop within reach" in armed(run)["cautions"][0]
-    assert "CAUTION  driver virtual does not bring the output to 0 V by itself" in capsys.readouterr().err
+        assert "hardware emergency stop" in armed(run)["cautions"][0]
+    assert "CAUTION  driver virtual" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("outliving")
@@ -342,7 +339,7 @@ def test_a_switch_that_the_host_reads_does_not_stand_in_for_the_device():
     channels = [*bench().model_dump()["channels"], ESTOP]
     stop = {"channel": "estop", "below_v": -50.0}
     chosen = Bench.model_validate({**bench().model_dump(), "channels": channels, "emergency_stop": stop})
-    assert "keep a hardware emergency stop within reach" in unguarded_text(chosen, Capabilities(**UNSAFE))
+    assert "hardware emergency stop" in unguarded_text(chosen, Capabilities(**UNSAFE))
 
 
 def test_whoever_is_asked_once_is_asked_again_after_a_trip():

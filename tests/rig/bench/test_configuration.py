@@ -59,12 +59,12 @@ def test_a_bench_memory_that_is_a_fifo_counts_as_a_trip(monkeypatch, tmp_path):
 def test_a_file_of_more_than_a_megabyte_is_refused_by_its_size(tmp_path):
     with (tmp_path / "large.toml").open("wb") as stream:
         stream.truncate(100_000_000)
-    assert "large.toml: has 100000000 bytes, allowed are up to 1000000" in refusal(read_toml, tmp_path / "large.toml")
+    assert "has 100000000 bytes" in refusal(read_toml, tmp_path / "large.toml")
 
 
 def test_a_name_that_no_file_can_have_is_refused(tmp_path):
     assert "is not the name of a file" in refusal(load_plan, "a\0b.toml")
-    assert "cannot be read (File name too long)" in refusal(load_plan, f"{'a' * 300}.toml")
+    assert "File name too long" in refusal(load_plan, f"{'a' * 300}.toml")
 
 
 @pytest.mark.parametrize(

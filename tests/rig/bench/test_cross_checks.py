@@ -103,7 +103,7 @@ def test_a_single_sample_may_last_as_long_as_it_will():
 def test_a_block_longer_than_samples_may_be_lost_is_a_caution():
     (line,) = cautions(bench_with({"block": 500}))
     assert line.startswith("`block` = 500: lasts 0.1 s, and so late a limit acts")
-    assert "allowed: 1 to 250 with limits.lost_s = 0.05" in line
+    assert "allowed: 1 to 250" in line
     assert cautions(bench_with({"block": 250})) == ()
     assert cautions(bench_with({"block": 500, "limits": {"lost_s": 0.1}})) == ()
 

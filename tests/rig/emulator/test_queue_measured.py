@@ -100,7 +100,7 @@ def test_a_run_says_and_records_its_queue(emulator: Emulator) -> None:
 def test_a_multisine_gets_a_tenth_of_a_second(emulator: Emulator) -> None:
     remarks, queue = run_on(emulator.bench, "magnet-beam/multisine-1", levels_rms_v=(0.05,), realisations=1, periods=2)
     assert (queue["how"], queue["blocks"]) == ("open loop", 10)
-    assert "no output of this plan answers what is measured" in remarks[0]
+    assert "no output of this plan" in remarks[0]
 
 
 def test_gains_that_do_not_bear_the_delay_are_refused_before_anything_is_recorded(

@@ -106,7 +106,7 @@ def test_a_recording_shows_its_rehearsal_and_resumes_with_it(tmp_path, foreseein
     print_summary(summarise(path))
     shown = capsys.readouterr().out
     assert "rehearsed: ends well 100 %, trips 0 % (up to 19 %) of 16 draws; r.h5" in shown
-    assert "the run lies within what was foreseen" in shown
+    assert "within what was foreseen" in shown
     with resume_run(path) as recording:
         assert recording.complete
     with Recording(path) as recording:

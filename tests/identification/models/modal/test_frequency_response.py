@@ -232,7 +232,7 @@ def test_extrapolation_is_flagged_and_refused() -> None:
     assert frequency_response(mode, 0.9 * top).notes == ()
     flagged = frequency_response(mode, 1.8 * top)
     assert flagged.range_use.max() > 1.25
-    assert any("times the largest modal amplitude identified: extrapolated" in note for note in flagged.notes)
+    assert any("extrapolated" in note for note in flagged.notes)
     with refused(ExtrapolationError, "drives-the-mode-beyond-times-the", field="force_n"):
         frequency_response(mode, 5.0 * top)
     allowed = frequency_response(mode, 5.0 * top, largest_range_use=np.inf)

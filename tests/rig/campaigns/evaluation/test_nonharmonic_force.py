@@ -88,7 +88,7 @@ def test_every_campaign_under_a_lock_refuses_points_with_more_than_is_accepted(n
         skipped = run.recording.parts[-1].end["skipped"]
     for point in points:
         assert 1e-6 < point["nonharmonic_force"] < 0.04
-        assert "are no harmonics, accepted up to 0.0001 %" in point["reason"]
+        assert "accepted up to 0.0001 %" in point["reason"]
         assert point["quality"] == "rejected"
     assert skipped.startswith(f"{len(points)} of {len(points)} points skipped: rejected")
 

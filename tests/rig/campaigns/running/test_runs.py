@@ -368,7 +368,7 @@ def test_a_trip_ends_the_run_and_the_file_names_channel_value_and_sample(tmp_pat
         end = recording.parts[0].end
         accepted = [point for point in recording.points if point["accepted"]]
     assert end["tripped"]
-    assert "displacement above its limit on channel" in end["text"]
+    assert "displacement above its limit" in end["text"]
     assert "sample" in end["text"]
     assert 0 < len(accepted) < len(LEVELS)
 

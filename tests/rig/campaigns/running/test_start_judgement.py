@@ -111,7 +111,7 @@ def test_the_command_takes_the_recording_of_a_check(tmp_path, command):
     check(bench_with({}, "magnet-beam"), path, RunOptions(seed=3))
     command("run", "magnet-beam/backbone-short", "-o", tmp_path / "run.h5", "--check", path).succeeded()
     ended = command("run", "friction-beam/backbone-short", "-o", tmp_path / "other.h5", "--check", path)
-    assert "is a check of other channels than those of the bench" in ended.err
+    assert "other channels" in ended.err
 
 
 @pytest.mark.parametrize("scaled_by", [1.0, 0.1])
@@ -162,5 +162,5 @@ def test_a_start_that_cannot_be_compared_with_the_check_says_so_and_the_first_po
         points = list(recording.points)
         remarks = [event["text"] for event in recording.parts[0].events if event["what"] == "remark"]
     assert len(points) == 3
-    assert sum("not steady enough to compare its scale" in remark for remark in remarks) == with_check
+    assert sum("not steady enough" in remark for remark in remarks) == with_check
     assert all(any("channel force: " in line for line in point["warnings"]) for point in points) is with_check

@@ -126,7 +126,7 @@ def test_an_interruption_that_comes_again_drops_the_output(loop_of):
             ran(loop)
     else:
         ran(loop)
-    assert "SystemExit was raised in the driver again" in str(loop.failure)
+    assert "SystemExit" in str(loop.failure)
     assert loop.tick.guard["mode"][0] == GuardMode.OFF
     assert daq.zeros_at_the_end == 1
 

@@ -61,8 +61,8 @@ def test_a_driver_that_hangs_is_noticed_and_its_process_ended(noting, monkeypatc
         _, loop = ran(session, tone(slow_bench(), 60.0))
         assert not is_there(session.pid)
     assert type(loop.failure) is DaqError
-    assert "silent for 1 s: its driver hangs" in str(loop.failure)
-    assert "was killed; only the device's watchdog has acted" in str(loop.failure)
+    assert "silent for 1 s" in str(loop.failure)
+    assert "only the device's watchdog" in str(loop.failure)
     assert loop.tick.guard["mode"][0] == GuardMode.OFF
 
 

@@ -110,7 +110,7 @@ def test_the_line_says_how_long_the_queue_lasts_and_what_for(made):
         choice = settle_queue(daq, BENCH)
     assert choice.remark == choice.text
     assert choice.text.startswith(f"queue_blocks = {choice.blocks} (auto): lasts {2 * choice.blocks} ms; ")
-    assert "blocks came up to 5 ms late (counted 1.5 times)" in choice.text
+    assert "counted 1.5 times" in choice.text
     assert "\n" not in choice.text
 
 
