@@ -34,7 +34,7 @@ def refused(
         assert wanted(found) if isinstance(wanted, Callable) else found == wanted, f"{name} = {found!r} of: {stated}"
     if says is not None:
         assert re.search(MESSAGES[error.__name__][says], str(caught.value)), str(caught.value)
-    del caught, stated  # this frame is in the traceback: a file that is open there would stay until garbage is collected
+    del caught, stated  # a frame of the traceback, this one, would keep what is open there
 
 
 def _stated(error: Exception) -> Exception:
