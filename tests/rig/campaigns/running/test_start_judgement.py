@@ -162,5 +162,5 @@ def test_a_start_that_cannot_be_compared_with_the_check_says_so_and_the_first_po
         points = list(recording.points)
         remarks = [event["text"] for event in recording.parts[0].events if event["what"] == "remark"]
     assert len(points) == 3
-    assert sum("not steady enough" in remark for remark in remarks) == with_check
+    assert sum("not steady enough to compare" in remark for remark in remarks) == with_check
     assert all(any("channel force: " in line for line in point["warnings"]) for point in points) is with_check
