@@ -174,4 +174,4 @@ class Sampling:
         step_v, most = self.plant.output_v_per_count, 2 ** (self.plant.bits - 1) - 1
         largest = round(self.plant.output_range_v / step_v)
         counts = np.maximum(np.rint(volts / step_v), -min(largest, most + 1))  # both in a third of the time of np.clip
-        return np.minimum(counts, min(largest, most)).astype(np.int64)
+        return np.asarray(np.minimum(counts, min(largest, most)), np.int64)
