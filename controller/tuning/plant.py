@@ -132,6 +132,17 @@ class PlantModel:
 
         Raises ValueError if no frequency near the mode has this lag.
         """
+        found = self._lock_frequencies.get(lag_deg)
+        if found is None:
+            found = self._lock_frequencies[lag_deg] = self._found_lock_frequency(lag_deg)
+        return found
+
+    @cached_property
+    def _lock_frequencies(self) -> dict[float, float]:
+        """What `lock_frequency_rad_s` has found, by lag: a design asks for the same one at every set of gains."""
+        return {}
+
+    def _found_lock_frequency(self, lag_deg: float) -> float:
         from scipy.optimize import brentq
 
         InputError.raise_if(not -180.0 < lag_deg < 0.0, field="lag_deg", value=lag_deg, allowed="between -180 and 0")

@@ -156,8 +156,8 @@ def _newton(
     change = np.zeros_like(s)
     with np.errstate(all="ignore"):
         for _ in range(steps):
-            slope = (function(s + width) - function(s - width)) / (2.0 * width)
-            change = function(s) / slope
+            above, below, here = function(np.concatenate([s + width, s - width, s])).reshape(3, -1)
+            change = here * (2.0 * width) / (above - below)
             change = change * np.minimum(1.0, longest / np.abs(change))
             s = np.where(np.isfinite(change), s - change, s)
     return s, change
