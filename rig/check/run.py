@@ -18,7 +18,7 @@ from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 
 BAND = (0.4, 2.5)  # of the linear frequency: band of the multisine
-LINES = 200.0  # number of lines up to the linear frequency
+LINES = 200.0  # least number of lines up to the linear frequency
 ENOUGH = 0.999  # coherence of the worst channel that suffices
 CLEAR_COHERENCE = 0.9999
 """Coherence of the best channel above which a dead one will not appear at a higher level either."""
@@ -99,9 +99,11 @@ def _assessed(bench: Bench, path: Path, reference: str | Path | None) -> Assessm
 
 
 def _plan(bench: Bench, name: str, level_rms_v: float, silent_s: float) -> MultisinePlan:
+    from scipy.fft import next_fast_len
+
     linear, allowed = bench.specimen.linear_frequency_hz, bench.limits.frequency_hz
     lowest, highest = max(BAND[0] * linear, allowed[0]), min(BAND[1] * linear, allowed[1])
-    samples = round(bench.sample_rate_hz * LINES / linear)
+    samples = next_fast_len(round(bench.sample_rate_hz * LINES / linear))  # other periods take eight times as long
     if samples < 4.0 * LINES or not lowest < linear < highest:
         raise ConfigurationError(
             field="specimen.linear_frequency_hz",
