@@ -3,12 +3,15 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from identification.mapping import CsvLayout
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.tables.clocks import is_clock
 from rig.exchange.tables.rows import Columns, cells_of
 from vibrolock.quantities import quantity
+
+if TYPE_CHECKING:
+    from identification.mapping import CsvLayout
 
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 Lines = Sequence[tuple[int, str]]
@@ -28,7 +31,7 @@ class Heading:
     """Cells of the first row."""
 
 
-def heading_of(lines: Lines, layout: CsvLayout) -> Heading | None:
+def heading_of(lines: Lines, layout: "CsvLayout") -> Heading | None:
     """Return the heading at the beginning of a table; None if it has no row of numbers.
 
     Raises `ImportFailed` if the first line does not name every column.
