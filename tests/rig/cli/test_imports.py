@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import cache
 
 import pytest
 
@@ -124,9 +125,15 @@ def _loaded(folder, code, *arguments, status=0):
     return set(json.loads((folder / "loaded.json").read_text()))
 
 
+@cache
+def _loaded_by(folder, line):
+    """What a command that succeeds loads; two tests ask for some of them."""
+    return _loaded(folder, "from rig.cli import main; main()", *line.split())
+
+
 @pytest.mark.parametrize("line", ALLOWED)
 def test_a_command_loads_what_it_uses_and_nothing_else(folder, line):
-    loaded = _loaded(folder, "from rig.cli import main; main()", *line.split())
+    loaded = _loaded_by(folder, line)
     assert loaded - LIGHT - ALLOWED[line] == set()
 
 
@@ -145,7 +152,7 @@ def test_stopping_loads_next_to_nothing(folder, monkeypatch):
     ],
 )
 def test_what_a_command_uses_is_seen(folder, line, used):
-    assert used <= _loaded(folder, "from rig.cli import main; main()", *line.split())
+    assert used <= _loaded_by(folder, line)
 
 
 @pytest.mark.parametrize("package", ["rig", "controller", "simulators", "identification", "vibrolock"])
