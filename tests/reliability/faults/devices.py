@@ -53,6 +53,10 @@ class VirtualRigInProcess(Watched, VirtualDAQ):
         self._kept: list[np.ndarray] = []
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
+        if self.fault is None or self.fault.part != "driver":  # nothing of what follows, which takes as long as a block
+            self.handed.append(voltages.copy())
+            inputs[:], self.flags[:] = self.broken.step(voltages)
+            return
         if self.due("times-out"):
             raise DaqTimeout("no block within the agreed time")
         if self.due("raises"):
@@ -134,6 +138,12 @@ class EmulatedRig(Watched, WireDAQ):
         return MemoryLink(self.wire, host=True)
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
+        if self.fault is not None and self.fault.part == "driver":
+            self._act()
+        self.handed.append(voltages.copy())
+        super()._exchange(voltages, inputs)
+
+    def _act(self) -> None:
         if self.due("unplugged") or self.due("host-killed"):
             self.wire.cut = True
         if self.due("host-killed"):
@@ -141,8 +151,6 @@ class EmulatedRig(Watched, WireDAQ):
         if self.due("emergency-stop"):
             self.device.press_emergency_stop()
         self._disturb()
-        self.handed.append(voltages.copy())
-        super()._exchange(voltages, inputs)
 
     def _disturb(self) -> None:
         """What happens to blocks on the wire, counted from the onset."""
