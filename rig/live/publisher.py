@@ -212,7 +212,9 @@ class Publisher(Live, Closing):
 
 def _joined(chunks: list[np.ndarray]) -> np.ndarray:
     """Chunks of rows one after another. `numpy.concatenate` compares the fields of every two, which takes far longer."""
-    return np.frombuffer(b"".join(chunk.tobytes() for chunk in chunks), chunks[0].dtype) if len(chunks) > 1 else chunks[0]
+    return (
+        np.frombuffer(b"".join(chunk.tobytes() for chunk in chunks), chunks[0].dtype) if len(chunks) > 1 else chunks[0]
+    )
 
 
 def _reserved(path: Path, size: int) -> mmap.mmap:
