@@ -90,6 +90,18 @@ class Backbone(Result):
         """float[n_points]: target phase lag minus measured phase lag, degrees."""
         return np.array([point.phase_error_deg for point in self.points])
 
+    def table(self) -> list[dict[str, float | str]]:
+        """Return one dictionary a point: force, frequency, amplitude, phase error, and direction and pass where noted."""
+        columns: dict[str, Sequence[float | str]] = {
+            "force_n": self.force_n.tolist(),
+            "frequency_hz": self.frequency_hz.tolist(),
+            "amplitude_m": self.amplitude_m.tolist(),
+            "phase_error_deg": self.phase_error_deg.tolist(),
+            **({"direction": self.directions} if self.directions else {}),
+            **({"repeat": self.repeats} if self.repeats else {}),
+        }
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
     def select(self, keep: Sequence[bool]) -> "Backbone":
         """Return the backbone of the points where ``keep`` is true, with their labels."""
         if len(keep) != len(self.points):

@@ -68,6 +68,18 @@ class FrequencyResponse(Result):
         IdentificationError.unless_one_of("controlled", self.controlled, get_args(Controlled))
         positive("level", self.level)
 
+    def table(self) -> list[dict[str, float]]:
+        """Return one dictionary a point: frequency, force, amplitude and lag of the displacement behind the force."""
+        columns = {
+            "frequency_hz": self.frequency_hz,
+            "force_n": self.force_n,
+            "amplitude_m": self.amplitude_m,
+            "phase_lag_deg": self.phase_lag_deg,
+        }
+        return [
+            dict(zip(columns, row, strict=True)) for row in zip(*map(np.ndarray.tolist, columns.values()), strict=True)
+        ]
+
     @property
     def level_unit(self) -> str:
         """Unit of ``level``; empty where nothing was controlled."""

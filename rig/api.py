@@ -44,6 +44,16 @@ class Run(Result, Closing):
         self.recording = recording
         self._delete = None if temporary is None else finalize(self, rmtree, temporary, ignore_errors=True)
 
+    def __repr__(self) -> str:
+        """Return what the run is: its kind, bench, accepted points and file."""
+        recording = self.recording
+        accepted = sum(bool(point["accepted"]) for point in recording.latest.values())
+        bench = recording.configuration["bench"]["name"]
+        planned = "complete" if recording.complete else "not complete"
+        return f"<Run: {recording.kind} on {bench}, {accepted} points accepted, {planned}, {recording.path}>"
+
+    __str__ = __repr__  # a notebook shows the table of its points, and `to_pandas` has it
+
     @property
     def complete(self) -> bool:
         """Whether every point of the plan was measured and accepted."""

@@ -9,6 +9,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.axes import Axes
 
 GROUP = "vibrolock.presentation"
@@ -16,7 +17,7 @@ GROUP = "vibrolock.presentation"
 
 
 class Result:
-    """Base of results: `plot` draws them, and a notebook shows them as a table."""
+    """Base of results: `plot` draws them; `print` and a notebook show them as a table."""
 
     def plot(self, **options: object) -> "tuple[Axes, ...]":
         """Draw the result; return the axes of the figure, from the top left to the bottom right.
@@ -30,6 +31,25 @@ class Result:
             )
         axes: tuple[Axes, ...] = draw(self, **options)
         return axes
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return the table of the result, one row for each of what it consists of; SI units, as in the names of its columns.
+
+        Raises `ImportError` without pandas, `TypeError` for a result that has no such table.
+        """
+        rows = getattr(self, "table", None)
+        if rows is None:
+            raise TypeError(f"to_pandas: a {type(self).__name__} has no table of its own; `print` shows what there is")
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_pandas: needs pandas; install vibrolock[tables], or use table()") from None
+        return pandas.DataFrame(rows())
+
+    def __str__(self) -> str:
+        """Return the table of the result as text; its ``repr`` if it has no table."""
+        text = self._shown_as("text")
+        return repr(self) if text is None else text
 
     def _repr_html_(self) -> str | None:
         """Return the result as a table for a notebook; None, and thus the text, if it has no table."""

@@ -29,6 +29,8 @@ class Campaign:
     draw: str
     """``module:function`` that draws a recording on an empty page, ``(page, recording)``. It is imported only when a figure is
     drawn."""
+    panels: tuple[str, ...] = ()
+    """Names of the parts of its figure that may be drawn alone; its function then takes them as ``panels``."""
     figure_in: tuple[float, float] = (9.0, 6.4)
     """Width and height of the page of its figure, inches."""
     watch: Callable[..., tuple[Point[object], str]] | None = None

@@ -23,6 +23,9 @@ def plot_(
     channel: Annotated[str, typer.Option(help="Sensor to show; by default the drive point.")] = "",
     harmonic: Annotated[int, typer.Option(help="Harmonic to show.")] = 1,
     frequency: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Ends of the frequency axis, Hz.")] = "",
+    panels: Annotated[
+        str, typer.Option(metavar="NAMES", help="Parts of a recording's figure: backbone, history; by a comma.")
+    ] = "",
     lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
     style: Annotated[
         str, typer.Option(help="screen, paper (one column, 85 mm), slide (16:9), or a style sheet of matplotlib.")
@@ -41,7 +44,8 @@ def plot_(
     restyle(style, size_mm=_size_mm(size))
     try:
         chosen = None if view == View() else view
-        plot(files, output, lateness=lateness, labels=label or (), view=chosen, overwrite=overwrite)
+        names = [name.strip() for name in panels.split(",") if name.strip()]
+        plot(files, output, lateness=lateness, labels=label or (), view=chosen, panels=names, overwrite=overwrite)
     finally:
         restyle()
 

@@ -98,7 +98,7 @@ def draw_properties(left: Axes, right: Axes, mode: NonlinearMode, colour: str = 
     else:
         say_why_empty(right, "damping needs the specimen's drive_mode_shape")
     right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
-    widen(right, 0.4)
+    widen(right, 0.15)
     right.set_ylim(bottom=max(0.0, right.get_ylim()[0]))
 
 

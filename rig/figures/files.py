@@ -31,12 +31,14 @@ def plot(
     lateness: bool = False,
     labels: Sequence[str] = (),
     view: View | None = None,
+    panels: Sequence[str] = (),
     overwrite: bool = False,
 ) -> None:
     """Draw the contents of ``source`` into ``figure`` (png, pdf or svg, by its suffix).
 
     With ``lateness``, draw the timing of the recording's control loop instead. Of several files, or with ``labels`` or a
-    ``view``, draw the curves alone, over one another (`rig.figures.overlay.overlay`). Without ``overwrite``, only figures of
+    ``view``, draw the curves alone, over one another (`rig.figures.overlay.overlay`). ``panels``: the parts of a recording's
+    figure that are drawn, by name. Without ``overwrite``, only figures of
     this program are replaced. Raises `RecordingError` if a file cannot be read or the figure cannot be written.
     """
     sources = [source] if isinstance(source, Path) else list(source)
@@ -47,7 +49,7 @@ def plot(
         raise RecordingError(f"{figure}: is the file that is read; choose another name")
     if not overwrite:
         check_replaceable(figure)
-    size_in, draw = drawing_of(sources, lateness=lateness, labels=labels, view=view)
+    size_in, draw = drawing_of(sources, lateness=lateness, labels=labels, view=view, panels=panels)
     with page_for(figure, size_in) as page:
         draw(page)
 
@@ -58,10 +60,16 @@ class FileOptions(TypedDict, total=False):
     lateness: bool
     labels: Sequence[str]
     view: View | None
+    panels: Sequence[str]
 
 
 def drawing_of(
-    sources: Sequence[Path], *, lateness: bool = False, labels: Sequence[str] = (), view: View | None = None
+    sources: Sequence[Path],
+    *,
+    lateness: bool = False,
+    labels: Sequence[str] = (),
+    view: View | None = None,
+    panels: Sequence[str] = (),
 ) -> tuple[tuple[float, float], Callable[[Figure], None]]:
     """Return the size (inches) of the page for one or several files, and the function that draws them on an empty page.
 
@@ -70,19 +78,35 @@ def drawing_of(
     curves = len(sources) > 1 or bool(labels) or view is not None
     if lateness and curves:
         raise RecordingError("`lateness`: is drawn of one recording, without labels and axes of one's own")
-    return overlay(sources, labels, view) if curves else drawing(sources[0], lateness=lateness)
+    if panels and (curves or lateness):
+        raise RecordingError(
+            "`panels`: are those of one recording's figure, without labels, axes of one's own and lateness"
+        )
+    return overlay(sources, labels, view) if curves else drawing(sources[0], lateness=lateness, panels=panels)
 
 
-def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float], Callable[[Figure], None]]:
+def drawing(
+    source: Path, *, lateness: bool = False, panels: Sequence[str] = ()
+) -> tuple[tuple[float, float], Callable[[Figure], None]]:
     """Return the size (inches) of the page for a file, and the function that draws the file's contents on an empty page.
 
     The arguments are those of `plot`. Raises `RecordingError` if the file is not one of ours; the function raises it, too.
     """
     kind = kind_of(source)
+    _check_panels(kind, source, panels)
     if kind in KINDS and not lateness:
         return KINDS[kind].figure_in, lambda page: _draw_model(page, source, kind)
     size_in = CAMPAIGNS[kind].figure_in if kind in CAMPAIGNS and not lateness else (9.0, 6.4)
-    return size_in, lambda page: _draw_recording(page, source, lateness=lateness)
+    return size_in, lambda page: _draw_recording(page, source, panels, lateness=lateness)
+
+
+def _check_panels(kind: str, source: Path, panels: Sequence[str]) -> None:
+    """Raise `RecordingError` for a panel that the figure of a file does not have."""
+    there = CAMPAIGNS[kind].panels if kind in CAMPAIGNS else ()
+    for name in panels:
+        if name not in there:
+            allowed = ", ".join(there) or "none, for the figure of this kind is drawn as a whole"
+            raise RecordingError(f"`panels` {name}: {source} is of kind {kind}; allowed: {allowed}")
 
 
 def _draw_model(page: Figure, source: Path, kind: str) -> None:
@@ -91,13 +115,14 @@ def _draw_model(page: Figure, source: Path, kind: str) -> None:
         KINDS[kind].draw_on(page, found)
 
 
-def _draw_recording(page: Figure, source: Path, *, lateness: bool) -> None:
+def _draw_recording(page: Figure, source: Path, panels: Sequence[str], *, lateness: bool) -> None:
     with Recording(source) as recording:
         if lateness:
             draw_lateness(page, recording)
             return
         try:
-            resolve_name(CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw)(page, recording)
+            draw = resolve_name(CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw)
+            draw(page, recording, **({"panels": panels} if panels else {}))
         except IdentificationError:
             if any(point.accepted for point in points_of(recording)):
                 raise

@@ -32,6 +32,8 @@ class _Look:
     line: str
     size: float = 1.0
     """Of its markers, over the usual size: earlier files have larger ones, which later ones do not hide."""
+    hollow: bool = False
+    """Whether its markers are open, so that those of other files below are seen."""
 
 
 def overlay(
@@ -118,7 +120,7 @@ def _look(number: int, level: int, files: int, levels: int, dense: bool) -> _Loo
     if dense:
         return _Look(colour, "", LINES[kind % len(LINES)] if files > 1 else "-")
     size = 1.0 + 0.6 * (files - 1 - number) / max(1, files - 1)
-    return _Look(colour, MARKERS[kind] if kind < len(MARKERS) else ".", "-", size)
+    return _Look(colour, MARKERS[kind] if kind < len(MARKERS) else ".", "-", size, hollow=files > 1 and number > 0)
 
 
 def _line(
@@ -133,6 +135,8 @@ def _line(
     y = _shown(panel.y, line.y, view, unit)
     style: dict[str, Any] = {"color": look.colour, "marker": look.marker, "ls": look.line}
     style["markersize"] = look.size * rc("lines.markersize")
+    if look.hollow:
+        style["mfc"] = "none"
     if line.half_95 is not None and np.isfinite(line.half_95).any():
         axis.errorbar(x, y, line.half_95, **style)
         return
@@ -171,7 +175,15 @@ def _legend(page: Figure, names: Sequence[str], levels: Sequence[str], found: Se
     from matplotlib.lines import Line2D
 
     def entry(look: _Look, text: str, fill: str | None = None) -> Line2D:
-        return Line2D([], [], color=look.colour, marker=look.marker, ls=look.line, label=text, mfc=fill)
+        return Line2D(
+            [],
+            [],
+            color=look.colour,
+            marker=look.marker,
+            ls=look.line,
+            label=text,
+            mfc=fill or ("none" if look.hollow else None),
+        )
 
     entries = []
     if len(found) > 1:

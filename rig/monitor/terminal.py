@@ -14,7 +14,8 @@ from rich.text import Text
 
 from rig.live.facts import Line, RunFacts
 from rig.monitor.shown import Details, Shown
-from rig.monitor.words import duration, event_text, figure, point_cells, point_headings, share_word
+from rig.monitor.words import event_text, figure, point_cells, point_headings, share_word
+from rig.text.durations import duration
 from rig.text.levels import in_shown_unit, level_text
 from vibrolock.printable import printable
 

@@ -122,6 +122,7 @@ BACKBONE = Campaign(
     measure=measure_backbone_point,
     columns=BACKBONE_COLUMNS,
     draw="rig.campaigns.backbone.figure:draw",
+    panels=("backbone", "history"),
     identity=("controller.phase_lag_deg",),
     fixed=("harmonics",),
     measurements={Backbone: recorded_backbone},

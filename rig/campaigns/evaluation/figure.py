@@ -10,7 +10,7 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
-from rig.drawing.page import grid, text_below
+from rig.drawing.page import columns_for, grid, text_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, Axes, Figure, rc, say_why_empty, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -105,10 +105,16 @@ def draw_history(frequency: Axes, error: Axes | None, recording: Recording) -> N
 def _label_error(error: Axes, largest: float) -> None:
     error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-1.3 * largest, 1.3 * largest))
     handles, labels = error.get_legend_handles_labels()
-    if handles:
+    page = error.get_figure(root=True)
+    if handles and page is not None:
         named = dict(zip(labels, handles, strict=True))
         error.legend(
-            named.values(), named.keys(), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2
+            list(named.values()),
+            list(named),
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=columns_for(list(named), 0.75 * page.get_figwidth()),
+            borderaxespad=0.2,
         )
     else:
         say_why_empty(error, "nothing was recorded")

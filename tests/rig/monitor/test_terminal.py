@@ -18,7 +18,8 @@ from rig.live.reader import Frame
 from rig.monitor.replay import ReplayState
 from rig.monitor.shown import as_json, shown_frame
 from rig.monitor.terminal import STALE_S, draw
-from rig.monitor.words import duration, event_text, figure, point_text, share_word, state_text
+from rig.monitor.words import event_text, figure, point_text, share_word, state_text
+from rig.text.durations import duration
 from rig.tick.layout import recorded_row
 from rig.tick.safety.layout import EndReason, GuardMode
 
