@@ -3,6 +3,7 @@
 import io
 import zipfile
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,12 @@ def read_workbook(path: Path) -> FileData:
         raise TooMuchData(_LARGEST_SHEET)
     book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
     try:
-        sheets = {sheet.title: _sheet(sheet.title, sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
+        sheets = {}
+        for sheet in book.worksheets:
+            with closing(
+                sheet.iter_rows(values_only=True)
+            ) as rows:  # else the sheet stays open where a cell is refused
+                sheets[sheet.title] = _sheet(sheet.title, rows)
     finally:
         book.close()
     found = {title: sheet for title, sheet in sheets.items() if sheet[0]}
