@@ -55,7 +55,7 @@ def on_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]],
         return value
 
     def names() -> list[str]:
-        own = vars(sys.modules[package]).keys() - module_of.keys()
+        own = vars(sys.modules[package]).keys() - module_of.keys() - {"TYPE_CHECKING", on_use.__name__}
         for_inspect = sys._getframe(1).f_globals.get("__name__") == "inspect"
         return sorted(own if for_inspect else {*own, *module_of})
 

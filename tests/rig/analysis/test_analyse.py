@@ -18,7 +18,7 @@ from rig.analysis.plausible_sizes import implausible_sizes
 from rig.analysis.subject import peak, subject_of
 from rig.errors import ConfigurationError
 from simulators.analysis import NotConvergedError, phase_resonance_backbone
-from simulators.structures.structure import BeamStructure
+from simulators.parts import BeamStructure
 from tests.reference.harmonic_balance import backbone as reference_backbone, response_to_voltage
 from tests.reference.parameters import ONE_SIDED
 from tests.refused import refused
