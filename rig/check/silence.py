@@ -87,10 +87,9 @@ def hum(values: Float, mains_hz: float, sample_rate_hz: float) -> float:
     columns = [part(2.0 * math.pi * f * time) for f in frequencies for part in (np.cos, np.sin)]
     if not columns:
         return 0.0
-    matrix = np.column_stack([np.ones_like(time), time / time[-1] - 0.5, *columns])
-    found, *_ = np.linalg.lstsq(
-        matrix.T @ matrix, matrix.T @ values
-    )  # columns nearly orthogonal: as good as over all rows
+    matrix = np.column_stack([np.ones_like(time), np.linspace(-0.5, 0.5, time.size), *columns])
+    # The columns are nearly orthogonal: their products lose no digits that matter.
+    found, *_ = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ values)
     left = float(np.std(values - matrix @ found))
     amplitudes = np.hypot(found[2::2], found[3::2])
     loud = amplitudes > MIN_SIGNIFICANCE * left * math.sqrt(2.0 / values.size)

@@ -47,9 +47,9 @@ def _single(group: Mapping[str, Value], above: str, depth: int) -> Iterator[tupl
 
 def _first(value: Value) -> Value:
     """Return the first entry of a list or of cells; None for anything else."""
-    cells = isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1
-    listed: list[Value] = list(value) if cells or isinstance(value, list) else []  # type: ignore[arg-type]
-    return listed[0] if listed else None
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1:
+        value = value.tolist()
+    return value[0] if isinstance(value, list) and value else None
 
 
 def _rounding(number: float) -> float:
