@@ -13,6 +13,7 @@ from unittest import mock
 import pytest
 
 from rig.cli import main
+from tests.waiting import LONG_S
 
 
 class Ended(NamedTuple):
@@ -37,6 +38,7 @@ def run_command(*words: object) -> Ended:
         redirect_stdout(out),
         redirect_stderr(err),
         signals_as_they_were(),
+        mock.patch.multiple("rig.show.waiting", FIRST_S=LONG_S, FURTHER_S=LONG_S),  # what is said is no matter of speed
         pytest.raises(SystemExit) as ended,
     ):
         main()

@@ -48,7 +48,6 @@ def rehearse_(
     json: Json = False,
 ) -> None:
     """Run a plan on virtual twins of a bench: how probably it ends well, trips, or loses the lock, and what would help."""
-    from rig.errors import ConfigurationError
     from rig.results.rehearsal.rehearse import Subject
 
     if compare is not None:
@@ -65,7 +64,7 @@ def rehearse_(
         seed=seed,
     )
     if output is None:
-        raise ConfigurationError("a file is wanted", field="output")
+        raise typer.BadParameter("a file is wanted", param_hint="--output")
     if twin is not None:
         _write_twin(subject, twin, output, overwrite)
         return

@@ -43,11 +43,10 @@ def run(
 ) -> None:
     """Carry out a plan and record it."""
     from rig.campaigns.running.runner import run_plan
-    from rig.errors import ConfigurationError
 
     loaded, chosen = plan_and_bench(plan, bench)
     if output is None and not dry_run:
-        raise ConfigurationError("a file is wanted", field="output")
+        raise typer.BadParameter("a file is wanted, or --dry-run", param_hint="--output")
     if daq is not None:
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
     if output is None or dry_run:

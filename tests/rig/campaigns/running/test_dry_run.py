@@ -67,4 +67,6 @@ def test_a_dry_run_writes_nothing_and_a_run_wants_a_file(command, place, monkeyp
     assert (status, err) == (0, "")
     assert out.endswith("nothing was driven\n")
     assert not (place / "run.h5").exists()
-    assert command("run magnet-beam/backbone") == (1, "", "rig: --output: a file is wanted\n")
+    status, out, err = command("run magnet-beam/backbone")
+    assert (status, out) == (2, "")
+    assert "--output: a file is wanted, or --dry-run" in err
