@@ -54,7 +54,6 @@ def test_a_twin_is_written_and_an_improved_plan_too(command):
             ["plan.toml", "-o", "r.h5"],
             "--from: nothing tells of the exciter and the structure of the bench magnet-beam",
         ),
-        (["plan.toml", "--exact"], "--output: a file is wanted"),
         (["plan.toml", "--exact", "-o", "r.txt"], "rehearsals are written as .h5"),
         (["plan.toml", "--exact", "-o", "missing/r.h5"], "there is no folder missing"),
         (["nothing.toml", "--exact", "-o", "r.h5"], "nothing.toml"),
@@ -75,6 +74,12 @@ def test_what_it_refuses_is_one_line_and_leaves_no_file(command, folder, argumen
     assert says in told.err
     assert told.err.count("\n") == 1
     assert {path.name for path in folder.iterdir()} == {"plan.toml"}
+
+
+def test_without_an_output_it_is_wrong_use(command):
+    told = command("rehearse plan.toml --exact")
+    assert told.status == 2
+    assert "--output: a file is wanted" in told.err
 
 
 def test_an_existing_file_stays_without_overwrite(command):
