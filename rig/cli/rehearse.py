@@ -96,7 +96,7 @@ def _rehearse(
     from rig.errors import ConfigurationError
     from rig.figures.files import plot
     from rig.rehearsal.report import lines, summary
-    from rig.results.rehearsal.rehearse import improve_into, rehearse_into, request_for
+    from rig.results.rehearsal.rehearse import expected_duration, improve_into, rehearse_into, request_for
     from rig.show.waiting import Waiting
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure
@@ -118,11 +118,12 @@ def _rehearse(
         check_figure(figure, overwrite)
     with Waiting("learning what is known of the rig"):
         request = request_for(subject)
-    with Rehearsing(subject.draws) as listener:
+    usual = expected_duration(request, jobs)
+    with Rehearsing(subject.draws, usual) as listener:
         found = rehearse_into(request, output, overwrite=overwrite, listener=listener, jobs=jobs)
     second = None
     if improve is not None:
-        with Rehearsing(subject.draws) as listener:
+        with Rehearsing(subject.draws, usual) as listener:
             found, second = improve_into(request, found, output, improve, listener=listener, jobs=jobs)
     if figure is not None:
         plot(output, figure)
@@ -149,7 +150,7 @@ def _rehearse(
 class Rehearsing:
     """Shows how many draws are done: a bar on a terminal, a line now and then elsewhere."""
 
-    def __init__(self, total: int) -> None:
+    def __init__(self, total: int, usual: str) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -158,11 +159,7 @@ class Rehearsing:
         self.total, self.bad = total, 0
         self.terminal = sys.stderr.isatty()
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self.waiting = Waiting(
-            f"rehearsing on {total} twins",
-            "the first draws after some 20 s, usually one to five minutes in all",
-            announced=True,
-        )
+        self.waiting = Waiting(f"rehearsing on {total} twins", usual, announced=True)
         self.began_s = self.first_s = time.monotonic()
         self.bar = Progress(*columns, console=Console(stderr=True), disable=not self.terminal)
         self.task = self.bar.add_task("rehearsing", total=total)

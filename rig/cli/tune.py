@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.options import Json, keep_existing
-from rig.cli.run_options import of_a_recording, shown, with_options
+from rig.cli.run_options import by_the_clock, of_a_recording, shown, with_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
@@ -54,6 +54,7 @@ def tune_(
     from rig.system.whole_file import whole_file
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure, draw_tuning
+    from rig.tuning.linear_test import expected_duration
     from rig.tuning.report import lines, summary
     from rig.tuning.tuning import TuningRequest, tune
     from vibrolock.printable import printable
@@ -73,9 +74,9 @@ def tune_(
         keep_existing([], rehearsed, options.overwrite)
     if figure is not None:
         check_figure(figure, options.overwrite)
-    what = f"tuning {loaded.name}: a low-level multisine, then the gains"
-    usual = "usually one to two minutes" + (", then a rehearsal of about as long" if rehearse else "")
-    with Waiting(what, usual), shown(options, MULTISINE_COLUMNS) as watched:
+    what = f"tuning {loaded.name}: a low-level multisine, then the gains{', then a rehearsal' if rehearse else ''}"
+    usual = expected_duration(loaded, by_the_clock=by_the_clock(loaded, options))
+    with Waiting(what, usual, announced=True), shown(options, MULTISINE_COLUMNS) as watched:
         found = tune(bench, recorded, request, watched, named=_as_seen_from(bench, output))
     with whole_file(output) as part:
         part.write_text(found.plan_toml, encoding="utf-8")
@@ -97,14 +98,14 @@ def tune_(
 def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> "Summary":
     from rig.cli.rehearse import Rehearsing
     from rig.rehearsal.report import summary, verdict_in_one_line
-    from rig.results.rehearsal.rehearse import Subject, rehearse_into, request_for
+    from rig.results.rehearsal.rehearse import Subject, expected_duration, rehearse_into, request_for
     from rig.show.waiting import Waiting
     from rig.system.whole_file import whole_file
 
     subject = Subject(plan=found.plan, bench=found.bench, sources=[recording], draws=draws)
     with Waiting("learning what is known of the rig"):
         request = request_for(subject)
-    with Rehearsing(draws) as listener:
+    with Rehearsing(draws, expected_duration(request, jobs=-1)) as listener:
         facts = summary(rehearse_into(request, rehearsed, overwrite=True, listener=listener, jobs=-1))
     head = wrap(f"Rehearsal: {verdict_in_one_line(facts)}.", 118, initial_indent="# ", subsequent_indent="# ")
     with whole_file(plan) as part:

@@ -18,12 +18,17 @@ from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, See
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
+from rig.text.durations import duration
 from rig.tuning.converter_bits import bits_force_n, periodic_beyond
 from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
 BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could excite lie inside
 LINES = 400.0  # number of lines up to the linear frequency while the level is searched for
 LINES_PER_BANDWIDTH = 4.0  # lines of the multisine in a half-power bandwidth; chosen
+REALISATIONS = 3  # of the last multisine
+PERIODS = 2  # of each realisation that are evaluated
+TRANSIENT_PERIODS = 1
+PLAYED_PERIODS = PERIODS + TRANSIENT_PERIODS
 MAX_REFINEMENT = 32.0  # most by which the spacing of the lines is reduced after the search
 GOOD_COHERENCE = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
 MIN_COHERENCE = 0.9  # least coherence of a level chosen by the user, or of the highest that the limits allow
@@ -84,7 +89,7 @@ def measure(
     resolution = 2.0 * damping_of(matrix, runs.lead_samples) * bench.specimen.linear_frequency_hz / LINES_PER_BANDWIDTH
     # the damping of a resonance between two lines is a guess
     resolution = max(resolution, _coarse(bench) / MAX_REFINEMENT)
-    found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), 3)
+    found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), REALISATIONS)
     matrix = voltage_responses(bench, found)
     around = near(bench, matrix.frequency_hz)
     nonlinear = np.maximum(matrix.total_std[around, 0, 0] ** 2 - matrix.noise_std[around, 0, 0] ** 2, 0.0)
@@ -99,6 +104,17 @@ def measure(
         acceleration_density=noise[1],
         bits_force_n=bits_force_n(bench, matrix, runs.force_beyond_n),
         levels_tried_v=tried,
+    )
+
+
+def expected_duration(bench: Bench, *, by_the_clock: bool) -> str:
+    """Return how long the multisines take, in words: with one level in the search, and with all that it may try."""
+    played_s = PLAYED_PERIODS * LINES / bench.specimen.linear_frequency_hz
+    least, most = (duration((levels + REALISATIONS) * played_s) for levels in (1, SEARCH.most_levels))
+    resolved = LINES_PER_BANDWIDTH / (2.0 * LINES)
+    clock = "" if by_the_clock else ", but a virtual rig does not wait for the clock"
+    return (
+        f"{least} of multisine, {most} if the level must rise far, longer below {100.0 * resolved:.2g} % damping{clock}"
     )
 
 
@@ -132,8 +148,8 @@ class _Runs:
             highest_hz=min(highest, allowed[1]),
             resolution_hz=resolution_hz,
             realisations=realisations,
-            transient_periods=1,
-            periods=2,
+            transient_periods=TRANSIENT_PERIODS,
+            periods=PERIODS,
         )
         with self.series.play(plan) as recording:
             _ended_well(recording, level_rms_v)

@@ -1,5 +1,6 @@
 """Rehearse plans from files to files: sources of knowledge in, a rehearsal, an improved plan or a twin out."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -8,6 +9,7 @@ from pathlib import Path
 from rig.bench import Bench
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.planning.plan import Plan
+from rig.campaigns.running.dry_run import dry_run
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -20,7 +22,10 @@ from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalRequest, d
 from rig.rehearsal.remedies import improve
 from rig.results.files import load, save
 from rig.results.kinds import KINDS
+from rig.text.durations import duration
 
+START_S = 10.0  # s until the processes of a rehearsal are at work; measured on two cores
+TIMES_REAL_TIME = 60.0  # speed of one process with the evaluation of its points; measured with the shipped backbones
 FURTHER_SEED = 1
 """Added to the seed of a rehearsal for that of the improved plan, which was chosen by the first one's twins."""
 
@@ -75,6 +80,14 @@ def request_for(subject: Subject) -> RehearsalRequest:
         draws=subject.draws,
         seed=subject.seed,
     )
+
+
+def expected_duration(request: RehearsalRequest, jobs: int | None) -> str:
+    """Return how long a rehearsal will take, in words, on so many processes (-1: one a core)."""
+    twin_s = dry_run(request.plan, request.bench, Path("rehearsal.h5")).least.duration_s
+    processes = os.cpu_count() or 1 if jobs is None or jobs < 1 else jobs
+    wanted_s = START_S + request.draws * twin_s / (TIMES_REAL_TIME * min(processes, request.draws))
+    return f"some {duration(wanted_s)}: each runs {duration(twin_s)} at about {TIMES_REAL_TIME:g} times real time"
 
 
 @contextmanager
