@@ -126,7 +126,17 @@ def pack_frequency_responses(responses: Sequence[FrequencyResponse]) -> tuple[di
 def unpack_frequency_responses(
     arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]
 ) -> tuple[FrequencyResponse, ...]:
-    """Invert `pack_frequency_responses`; raise `IdentificationError` if something is missing or unknown."""
+    """Invert `pack_frequency_responses`.
+
+    Parameters
+    ----------
+    arrays
+        Arrays by name.
+    attributes
+        Attributes by name.
+
+    Raises `IdentificationError` if something is missing or unknown.
+    """
     try:
         ends = np.cumsum(arrays["points_per_level"])[:-1]
         columns = [np.split(arrays[name], ends) for name in ("frequency_hz", "force", "response")]

@@ -171,14 +171,29 @@ def run(
     specimen_serial: str = "",
     notes: Sequence[str] = (),
 ) -> Run:
-    """Carry out a plan: a plan object, the name of a shipped plan (``"magnet-beam/backbone"``) or a TOML file.
+    """Carry out a plan.
 
-    ``bench`` replaces the bench that the plan names. ``seed`` seeds the noise of a virtual rig; the same seed gives the same
-    recording bit for bit on the same machine. With ``realtime`` a virtual rig runs no faster than the wall clock.
-
-    A bench on which something physical moves must be armed by a person: ``arm`` is True, or a callable that receives a
-    `rig.arming.arming.ArmingRequest` and returns whether to go on. ``operator`` (by default the user), ``specimen_serial`` and
-    ``notes`` are recorded.
+    Parameters
+    ----------
+    plan
+        A plan, the name of a shipped one (``"magnet-beam/backbone"``) or a TOML file.
+    bench
+        The bench in place of that which the plan names: a bench, the name of a shipped one or a TOML file.
+    output
+        Recording to write (.h5); by default one in a temporary folder.
+    seed
+        Seed of the noise of a virtual rig. The same seed gives the same recording bit for bit on the same machine.
+    realtime
+        Whether a virtual rig runs no faster than the wall clock.
+    overwrite
+        Whether an existing recording is replaced.
+    progress
+        Is told of points, warnings and the end as they come.
+    arm
+        Arms a bench on which something physical moves: True, or a callable that receives a
+        `rig.arming.arming.ArmingRequest` and returns whether to go on.
+    operator, specimen_serial, notes
+        Recorded with the run; the operator is the user by default.
 
     Raises `rig.errors.ConfigurationError` for a plan or bench that is not allowed, `rig.errors.RecordingError` for a file that
     cannot be written, `rig.errors.DaqError` for a device that cannot be started, and `rig.errors.NotArmed` if the bench was not
@@ -224,14 +239,22 @@ def resume(
 ) -> Run:
     """Continue a recording: keep the accepted points and measure the remaining points in a new part.
 
-    A changed ``plan`` of the same kind and bench replaces the current plan. Points of the new plan that were accepted under any
-    earlier plan are not measured again. Recorded points that the new plan does not contain stay in the file but no longer
-    count.
-
-    ``seed`` seeds the noise of the new part; if None, a seed is chosen that no earlier part has used. ``arm``, ``operator``,
-    ``specimen_serial`` and ``notes`` are as for `run`. A level that tripped, and every higher level, is tried again only with
-    ``retry_tripped``. The recorded bench may name functions of the user, which are code chosen by the author of the file: they
-    are imported only with ``trust_code``.
+    Parameters
+    ----------
+    output
+        The recording.
+    plan
+        A changed plan of the same kind and bench, which replaces the current one. Points of it that were accepted under any
+        earlier plan are not measured again. Recorded points that it does not contain stay in the file but no longer count.
+    seed
+        Seed of the noise of the new part; if None, one that no earlier part has used.
+    realtime, progress, arm, operator, specimen_serial, notes
+        As for `run`.
+    retry_tripped
+        Whether a level that tripped, and every higher level, is tried again.
+    trust_code
+        Whether functions of the user that the recorded bench names are imported. They are code chosen by the author of the
+        file.
 
     Raises `rig.errors.ConfigurationError` for a plan that cannot follow the recorded one or that asks for a level that tripped,
     and `rig.errors.RecordingError` for a file that cannot be read or written.

@@ -34,10 +34,16 @@ def ensemble(
 ) -> Iterator[tuple[str, Result]]:
     """Yield ``(name, function(variant))`` for every variant, in their order, as results arrive.
 
-    ``variants`` are rigs, seeds, benches, or other arguments of the function: a mapping from names, or any iterable, whose
-    items are named by counting from "0" and are taken only as workers become free. ``n_jobs`` is as in joblib: a number of
-    workers, -1 for all cores, None for the setting of `joblib.parallel_config`, or else 1. With joblib's own backend the
-    function runs in other processes; it should return the wanted results of a run, not the run.
+    Parameters
+    ----------
+    variants
+        Rigs, seeds, benches, or other arguments of the function: a mapping from names, or any iterable, whose items are
+        named by counting from "0" and are taken only as workers become free.
+    function
+        Called with each variant. With joblib's own backend it runs in other processes; it should return the wanted results
+        of a run, not the run.
+    n_jobs
+        As in joblib: a number of workers, -1 for all cores, None for the setting of `joblib.parallel_config`, or else 1.
 
     Raises `VariantError`, naming the variant, if the function fails. After such an error, after Ctrl-C, or if the iterator is
     closed early, variants that have not begun are dropped.

@@ -99,6 +99,14 @@ class ModeShapes:
 
 
 def mac(linear: Float, measured: Complex) -> float:
-    """Modal assurance criterion ``|a^T b|^2 / ((a^T a) (b^H b))`` of a linear and a measured shape, in [0, 1]."""
+    """Return the modal assurance criterion ``|a^T b|^2 / ((a^T a) (b^H b))``, in [0, 1].
+
+    Parameters
+    ----------
+    linear
+        Linear shape a, float[n].
+    measured
+        Measured shape b, complex[n], at the same points.
+    """
     product = abs(np.dot(linear, measured)) ** 2
     return float(product / (np.dot(linear, linear) * np.vdot(measured, measured).real))

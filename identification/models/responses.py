@@ -110,7 +110,17 @@ def frequency_response(
 def steady_predictions(
     model: object, forces_n: Sequence[float], **options: Unpack[ResponseOptions]
 ) -> tuple[SteadyPrediction, ...]:
-    """Predict the `frequency_response` at several forces; the message of an error names the force."""
+    """Predict the `frequency_response` at several forces; the message of an error names the force.
+
+    Parameters
+    ----------
+    model
+        A model of any kind that has steady states.
+    forces_n
+        Peak forces of the fundamental, N.
+    options
+        The further parameters of `frequency_response`.
+    """
     return tuple(frequency_response(model, force_n, **options) for force_n in forces_n)
 
 
@@ -153,7 +163,16 @@ def response_band(
 def harmonic_response(
     model: object, force_n: float | None = None, **options: Unpack[HarmonicOptions]
 ) -> HarmonicResponse:
-    """Predict the steady response with all harmonics; parameters and errors are those of `frequency_response`.
+    """Predict the steady response with all harmonics.
+
+    Parameters
+    ----------
+    model
+        A model with harmonics: PNLSS or structured.
+    force_n
+        Peak force of the fundamental, N.
+    options
+        The further parameters of `frequency_response`, whose errors are raised.
 
     PNLSS and structured models answer, by harmonic balance and arc-length continuation through folds. ``states`` of a
     structured model are its modal coordinates, ``state_use`` is the largest displacement of each element over its largest in
@@ -175,8 +194,20 @@ def steady_state(
 ) -> SteadyStates:
     """Compute the periodic vibration at one frequency and level: reached from rest as the level rises, or ``near`` another.
 
-    Other parameters and errors are those of `frequency_response`. The search begins at the first point of ``near`` and may
-    then exceed ``largest_range_use``.
+    Parameters
+    ----------
+    model
+        A model of any kind that has steady states.
+    frequency_hz
+        Frequency of the vibration, Hz.
+    force_n
+        Peak force of the fundamental, N; or give ``voltage_v``.
+    voltage_v
+        Peak voltage of the exciter, V.
+    near
+        A vibration, at whose first point the search begins. It may then exceed ``largest_range_use``.
+    options
+        The further parameters of `frequency_response`, whose errors are raised.
     """
     found = dynamic_model(model)
     request, _ = _request(found, force_n, StateOptions, options, voltage_v)
@@ -188,8 +219,17 @@ def backbone(
 ) -> SteadyStates:
     """Compute the vibrations at phase resonance from 2 % of a force up to this force, as a backbone test measures them.
 
-    Other parameters are those of `frequency_response`. ``near_hz``: the backbone begins at the mode of small vibrations that
-    is nearest, by default at that which moves the drive point most.
+    Parameters
+    ----------
+    model
+        A model of any kind that has steady states.
+    force_n
+        Largest peak force of the fundamental, N.
+    near_hz
+        The backbone begins at the mode of small vibrations nearest to this frequency, Hz; by default at that which moves
+        the drive point most.
+    options
+        The further parameters of `frequency_response`.
     """
     found = dynamic_model(model)
     return found.backbone(_request(found, force_n, BackboneOptions, options)[0], near_hz)

@@ -16,7 +16,18 @@ from vibrolock.arrays import Float
 def simulated_run(
     model: Simulator, experiment: Experiment, *, initial_state: Float | None = None, use: str = "test"
 ) -> SimulatedRun:
-    """Simulate an experiment from rest or from ``initial_state``, which is estimated if the experiment requires it.
+    """Simulate an experiment.
+
+    Parameters
+    ----------
+    model
+        The model.
+    experiment
+        The experiment.
+    initial_state
+        State before the first sample, float[n_states]; by default rest, or an estimate if the experiment requires it.
+    use
+        What the experiment is for, as it is stored with the run, such as ``training`` or ``test``.
 
     Raises `IdentificationError` if channels or sample rates of model and experiment differ, or an output is zero where it
     counts.
@@ -45,6 +56,15 @@ def simulated_run(
 
 def error_spectra(model: Simulator, linear: Simulator | None, experiment: Experiment) -> ErrorSpectra:
     """Return amplitudes by line of a periodic experiment: measurement, noise, model, errors of the model and its linear start.
+
+    Parameters
+    ----------
+    model
+        The model.
+    linear
+        The linear model with which the fit began; None without one.
+    experiment
+        A periodic experiment.
 
     Raises `IdentificationError` for an experiment that is not periodic.
     """
@@ -78,10 +98,20 @@ def error_spectra(model: Simulator, linear: Simulator | None, experiment: Experi
 def output_stretch(
     model: Simulator, experiment: Experiment, *, samples: int = 400, initial_state: Float | None = None
 ) -> OutputStretch:
-    """Return at most ``samples`` samples around the largest measured value of the first output, and the model's outputs there.
+    """Return some samples around the largest measured value of the first output, and the model's outputs there.
 
-    The run begins from rest or from ``initial_state``, which is estimated if the experiment requires it. Raises
-    `IdentificationError` if channels or sample rates of model and experiment differ.
+    Parameters
+    ----------
+    model
+        The model.
+    experiment
+        The experiment.
+    samples
+        Largest number of samples that are returned.
+    initial_state
+        State before the first sample, float[n_states]; by default rest, or an estimate if the experiment requires it.
+
+    Raises `IdentificationError` if channels or sample rates of model and experiment differ.
     """
     belongs(model, experiment, f"experiment '{experiment.name}'")
     run = run_of(model, experiment, initial_state)

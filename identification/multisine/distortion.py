@@ -88,7 +88,16 @@ class DistortionLevels(Result):
 def distortion_levels(
     spectra: PeriodicSpectra, *, input: str = "voltage", instruments: Sequence[str] = ("voltage",)
 ) -> DistortionLevels:
-    """Estimate the distortion of every channel other than ``input``; the module describes the choice of input.
+    """Estimate the distortion of every channel other than the input; the module describes the choice of input.
+
+    Parameters
+    ----------
+    spectra
+        Spectra of a multisine test, of two periods or more.
+    input
+        Name of the channel that is taken as the input.
+    instruments
+        Names of the channels that serve as instruments: noise-free signals that drive the inputs.
 
     Raises `IdentificationError` if there is only one period (noise is unknown), if the instrument has more than a
     tenth of its largest amplitude at a line that the design does not excite, and in the cases of

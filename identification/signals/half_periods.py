@@ -35,10 +35,19 @@ class HalfPeriods:
 
 
 def zero_crossings(signal: ArrayLike, *, sample_rate_hz: float, whole_periods: bool = False) -> HalfPeriods:
-    """Find the periods of ``signal``, float[n], between zero crossings, which are interpolated linearly between samples.
+    """Find the periods of a signal between zero crossings, which are interpolated linearly between samples.
 
-    With ``whole_periods`` only upward crossings count. A mean or an even harmonic, which makes both halves of a period
-    unequal, then does not affect the frequency. Raises `IdentificationError` if values are NaN or infinite, or there are
+    Parameters
+    ----------
+    signal
+        The signal, float[n].
+    sample_rate_hz
+        Samples per second.
+    whole_periods
+        Whether only upward crossings count. A mean or an even harmonic, which makes both halves of a period unequal, then
+        does not affect the frequency.
+
+    Raises `IdentificationError` if values are NaN or infinite, or there are
     fewer than two crossings.
     """
     values = finite_array("signal", signal, np.float64, 1)

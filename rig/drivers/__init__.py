@@ -37,7 +37,14 @@ def driver_names() -> list[str]:
 
 
 def make_daq(bench: Bench, seed: int = 0) -> DAQ:
-    """The driver that a bench asks for, not yet open.
+    """Return the driver that a bench asks for, not yet open.
+
+    Parameters
+    ----------
+    bench
+        The bench.
+    seed
+        Seed of the noise of a virtual rig.
 
     Raises `ConfigurationError` for an unknown name, a driver that cannot be imported, or options it refuses; `DaqError` for
     any other exception of it.

@@ -85,7 +85,15 @@ def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
 def response_matrices(
     recording: Recording, *, estimator: Estimator = "instrument"
 ) -> dict[float, FrequencyResponseMatrix]:
-    """Return the frequency responses from the force to every motion, by level (V RMS), with their covariance."""
+    """Return the frequency responses from the force to every motion, by level (V RMS), with their covariance.
+
+    Parameters
+    ----------
+    recording
+        Recording of a multisine or modal test.
+    estimator
+        ``instrument`` (the voltage is the instrument), ``H1``, ``H2`` or ``Hv``.
+    """
     found = _measured(recording, FrequencyResponseMatrix, estimator=estimator)
     return cast(dict[float, FrequencyResponseMatrix], found)
 

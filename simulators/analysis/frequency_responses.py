@@ -41,11 +41,18 @@ class FrequencyResponses:
 
 
 def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool = False) -> FrequencyResponses:
-    """Return the linear frequency responses at the given frequencies [n].
+    """Return the linear frequency responses at some frequencies.
 
-    ``held`` takes the voltage as held by the converter between samples. The images of the held voltage above half the sample
-    rate, which sampling folds back, are then included. Near a lightly damped resonance the force is so small that these images
-    matter.
+    Parameters
+    ----------
+    rig
+        The virtual rig.
+    frequencies_hz
+        Frequencies, float[n], Hz.
+    held
+        Whether the voltage is held by the converter between samples. The images of the held voltage above half the sample
+        rate, which sampling folds back, are then included. Near a lightly damped resonance the force is so small that these
+        images matter.
 
     Raises `ValueError` if a frequency is not above 0 or, with ``held``, not below half the sample rate.
     """

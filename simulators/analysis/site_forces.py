@@ -115,7 +115,19 @@ class SiteForces:
 def hysteresis_loops(
     rig: VirtualRig, responses: PeriodicResponses, point: int, *, samples: int = 512
 ) -> tuple[HysteresisLoop, ...]:
-    """Return the loops of all friction joints of ``rig`` at one point of its responses, in the order of ``rig.friction``."""
+    """Return the loops of all friction joints of a rig, in the order of ``rig.friction``.
+
+    Parameters
+    ----------
+    rig
+        The virtual rig.
+    responses
+        Its periodic responses.
+    point
+        Number of a point of the responses.
+    samples
+        Samples of one period of a loop.
+    """
     n_point, _, n_harmonic = responses.site_harmonics.shape
     if not -n_point <= point < n_point:
         raise InputError(field="point", value=point, allowed=f"{-n_point} to {n_point - 1}")

@@ -113,6 +113,15 @@ def as_recorded(prediction: SweepPrediction, sweep: Transient) -> tuple[Float, F
 def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = "") -> PredictionError:
     """Compare a predicted sweep with the corresponding recorded one, on the same time axis.
 
+    Parameters
+    ----------
+    prediction
+        The predicted sweep.
+    sweep
+        The recorded sweep, with a drive channel.
+    name
+        Name of the recording in the result.
+
     The fundamental of the drive channel (displacement, velocity or acceleration) is divided by the power of the instantaneous
     W that converts it to a displacement. The prediction is smoothed like the recording, which lowers the peak of a fast
     sweep. If the force is by zero crossings, its frequency and phase jump. The predicted displacement is then not smoothed,

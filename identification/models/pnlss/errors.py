@@ -24,7 +24,16 @@ _ENOUGH = 1e3
 def pnlss_errors(
     model: PnlssModel | Simulator, experiments: Sequence[Experiment], *, samples: int = SAMPLES
 ) -> PnlssErrors:
-    """Simulate each experiment and compare; an initial state to be estimated is fitted to the first ``samples`` samples.
+    """Simulate each experiment and compare.
+
+    Parameters
+    ----------
+    model
+        The model.
+    experiments
+        The experiments.
+    samples
+        Number of samples to which an initial state is fitted, where an experiment wants one to be estimated.
 
     A model of another kind begins from rest, or as it does itself (`identification.experiments.simulators.Follower`).
 
@@ -42,7 +51,16 @@ def pnlss_errors(
 
 
 def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, samples: int = SAMPLES) -> Float:
-    """float[n_states] before the first sample, by least squares on the first ``samples`` that count, each output over its RMS.
+    """Return the state before the first sample, float[n_states], by least squares, each output over its RMS.
+
+    Parameters
+    ----------
+    model
+        The model.
+    experiment
+        The experiment; its channels and sample rate are those of the model.
+    samples
+        Number of samples from the first that counts on, to which the outputs are fitted.
 
     Unobservable combinations of states stay near zero. For this the states are scaled so that each alone has an equal effect
     on the outputs; the result then depends neither on the units of the states nor on a known range.

@@ -122,8 +122,19 @@ def linear_pnlss(
 ) -> PnlssModel:
     """Return the initial linear model of a fit, with notes on its accuracy.
 
-    Constant inputs are not part of the best linear approximation; the fit over time identifies their effect. Parameters and
-    raised errors are those of `identify_pnlss`.
+    Parameters
+    ----------
+    experiments
+        The experiments that a fit would be trained with.
+    states
+        Number of states.
+    linear
+        A linear model to begin with, in place of one from the best linear approximation.
+    band_hz
+        Lowest and highest frequency that counts, Hz.
+
+    Constant inputs are not part of the best linear approximation; the fit over time identifies their effect. Raised errors are
+    those of `identify_pnlss`.
     """
     same_channels(experiments)
     first = experiments[0]

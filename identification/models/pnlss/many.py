@@ -183,11 +183,19 @@ def identify_many(
 ) -> Iterator[IdentifiedModel[Fit]]:
     """Yield the models of all jobs in the order in which they finish.
 
-    ``identify`` is called as ``identify(training, validation=...)`` with the job's experiments, in another process if there
-    are several workers. It is usually `identification.identify_pnlss` with its other arguments bound by `functools.partial`.
-    ``n_jobs`` is the number of workers as in joblib: -1 for all cores; None for the setting of `joblib.parallel_config`, else
-    1. Jobs whose names are in ``done`` are skipped, so that an interrupted study can be continued from its stored results.
-    ``progress`` is called with each result, the number of finished jobs and the number of all jobs.
+    Parameters
+    ----------
+    jobs
+        The jobs, each with a name of its own.
+    identify
+        Called as ``identify(training, validation=...)`` with the job's experiments, in another process if there are several
+        workers. It is usually `identification.identify_pnlss` with its other arguments bound by `functools.partial`.
+    n_jobs
+        Number of workers as in joblib: -1 for all cores; None for the setting of `joblib.parallel_config`, else 1.
+    done
+        Names of jobs that are skipped, so that an interrupted study can be continued from its stored results.
+    progress
+        Called with each result, the number of finished jobs and the number of all jobs.
 
     A failed job gives a result with its reason, and the others continue. After Ctrl-C, or if the iterator is closed early,
     jobs that have not started are dropped. Raises `IdentificationError` if two jobs have the same name.
