@@ -15,6 +15,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "mathml",
     "reference",
     "sphinx_copybutton",
     "sphinx_design",
@@ -22,7 +23,10 @@ extensions = [
 ]
 exclude_patterns = ["driver-template", "_build", "_extensions", "examples"]
 
-myst_enable_extensions = ["colon_fence", "deflist", "attrs_block", "substitution"]
+myst_enable_extensions = ["colon_fence", "deflist", "attrs_block", "substitution", "dollarmath"]
+myst_dmath_allow_space = False  # `$ rig list` and prices stay text
+myst_dmath_allow_digits = False
+html_math_renderer = "mathml"
 myst_heading_anchors = 5
 
 nitpicky = False
@@ -38,6 +42,8 @@ python_use_unqualified_type_names = True
 toc_object_entries = False
 
 html_theme = "pydata_sphinx_theme"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_title = f"vibrolock {release}"
 html_theme_options = {
     "show_nav_level": 1,

@@ -91,6 +91,15 @@ def test_nothing_is_loaded_from_elsewhere(pages):
     assert {load for page in pages.values() for load in page.loads - inside(page.loads)} == set()
 
 
+def test_formulas_are_typeset_when_the_site_is_built(built):
+    page = (built[0] / "explanation" / "damping.html").read_text(encoding="utf-8")
+    formulas = re.findall(r"<math.*?</math>", page, re.DOTALL)
+    sources = re.findall(r"\$[^$]+\$", (DOCS / "explanation" / "damping.md").read_text(encoding="utf-8"))
+    assert len(formulas) == len(sources) > 0
+    assert "ζ" in formulas[2]
+    assert not re.search(r"\\\w|\$", re.sub(r"<[^>]*>", "", page.split("<article")[1].split("</article")[0]))
+
+
 def test_every_word_of_the_code_has_its_place_on_the_site(built, pages):
     words = read_words(built[0])
     messages = (DOCS / "reference" / "messages").is_dir()
