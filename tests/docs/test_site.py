@@ -94,7 +94,7 @@ def test_nothing_is_loaded_from_elsewhere(pages):
 def test_formulas_are_typeset_when_the_site_is_built(built):
     page = (built[0] / "explanation" / "damping.html").read_text(encoding="utf-8")
     formulas = re.findall(r"<math.*?</math>", page, re.DOTALL)
-    sources = re.findall(r"\$[^$]+\$", (DOCS / "explanation" / "damping.md").read_text(encoding="utf-8"))
+    sources = re.findall(r"\$+[^$]+\$+", (DOCS / "explanation" / "damping.md").read_text(encoding="utf-8"))
     assert len(formulas) == len(sources) > 0
     assert "ζ" in formulas[2]
     assert not re.search(r"\\\w|\$", re.sub(r"<[^>]*>", "", page.split("<article")[1].split("</article")[0]))
