@@ -47,6 +47,9 @@ _LARGEST_STATIC = 10.0
 """Largest static force relative to the largest RMS of the training forces."""
 _SUPPORT = 0.01
 """Initial stiffness of the support relative to the first mode's at the drive point. Chosen."""
+_TWO_SIDED_95 = 1.96
+_AT_BOUND = 1e-6
+"""Relative distance within which a number is at a bound of the fit."""
 _SHARE = 0.1
 """Steps of central differences relative to the standard errors of the numbers. Chosen."""
 
@@ -252,6 +255,23 @@ def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> 
         more, less = (quantity(parameters.model(fit.values + sign * step)) for sign in (1.0, -1.0))
         parts.append((more - less) / (2.0 * _SHARE))
     return np.asarray(np.linalg.norm(parts, axis=0))
+
+
+def not_identified(fit: StructuredFit) -> tuple[str, ...]:
+    """Return which frequencies, damping ratios and support the data do not tell, by their names in the fit.
+
+    Their values are at a bound of the fit, or their 95 % intervals reach zero. Frequencies and damping ratios are fitted by
+    their logarithms: their intervals are relative ones.
+    """
+    parameters, std = _parameters_of(fit), np.sqrt(np.diag(fit.covariance))
+    at_bound = [np.isclose(fit.values, bound, rtol=_AT_BOUND, atol=0.0) for bound in parameters.bounds(fit.values)]
+    size = np.where(np.array([name == "support" for name in fit.names]), np.abs(fit.values), 1.0)
+    unknown = at_bound[0] | at_bound[1] | (_TWO_SIDED_95 * std >= size)
+    return tuple(
+        name
+        for name, one in zip(fit.names, unknown, strict=True)
+        if one and name.startswith(("frequency ", "damping ", "support"))
+    )
 
 
 def drawn(fit: StructuredFit, count: int, seed: int = 0) -> Iterator[StructuredModel]:

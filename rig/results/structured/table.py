@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
-from identification.models import Joint, std_of
+from identification.models import Joint, not_identified, std_of
 from rig.results.kind import Table
 from rig.results.simulated.table import say_errors, say_scatter, summary_of
 from rig.results.structured.model import IdentifiedStructured
@@ -89,6 +89,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
         "elements": [_element(element) for element in model.elements],
         "joints": any(isinstance(law, Joint) for element in model.elements for law in element.laws),
         "support_n_m": model.support_n_m,
+        "not_identified": [] if fit is None else list(not_identified(fit)),
         "fit": None
         if fit is None
         else {
@@ -138,7 +139,11 @@ def _say(summary: dict[str, Any]) -> None:
     )
     _say_trials([] if summary["fit"] is None else summary["fit"]["trials"])
     if summary["support_n_m"] > _LEAST_SUPPORT_N_M:
-        print(f"unseen support at the drive point: {number(summary['support_n_m'], '.4g')} N/m")
+        known = "support" not in summary["not_identified"]
+        value = f"{number(summary['support_n_m'], '.4g')} N/m" if known else "not identified"
+        print(f"unseen support at the drive point: {value}")
+    if unknown := [name for name in summary["not_identified"] if name != "support"]:
+        print(f"not identified, at a bound of the fit or with an interval that reaches 0: {', '.join(unknown)} (mode)")
     say_scatter(summary["scatter"])
     say_errors(summary)
 

@@ -8,7 +8,7 @@ import pytest
 from identification import Channel, IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.fit import fit_structured
+from identification.models.structured.fit import fit_structured, not_identified
 from identification.models.structured.laws import PolynomialDamper, PolynomialSpring
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
@@ -64,8 +64,18 @@ def test_the_static_force_that_no_sensor_shows_is_found():
     data = [replace(one, outputs=true.simulate_experiment(one).outputs) for one in data]
     found = fit_structured(linear_modes(true, 1), data)
     assert found.model.support_n_m == pytest.approx(1500.0, rel=0.05)
+    assert not_identified(found) == ()
     without = fit_structured(linear_modes(true, 1), data, support=False)
     assert found.training_error < 0.2 * without.training_error
+
+
+def test_a_support_that_the_data_do_not_show_is_said_to_be_not_identified():
+    linear = beam(elements=(), support_n_m=0.0)
+    data = [experiment(linear, noise=0.01)]
+    found = fit_structured(linear_modes(linear, 1), data, laws=(PolynomialSpring((0.0,)),))
+    unknown = not_identified(found)
+    assert "support" in unknown
+    assert not {"frequency 1", "damping 1"} & set(unknown)  # the second mode lies above the band
 
 
 @pytest.mark.slow
