@@ -1,6 +1,6 @@
 """
-What a point is worth
-=====================
+When a point is accepted
+========================
 
 Every point says whether it settled, how far the phase was off, and what its intervals are. Here a point is compared with the
 record it was evaluated from.
