@@ -11,10 +11,14 @@ from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive
 from vibrolock.compiled import kernel
 
-STUCK_SAMPLES = 16  # equal readings in a row; more than occur at a turning point of any vibration worth watching
+STUCK_SAMPLES = 16
+"""Least number of equal readings in a row after which a channel's motion is no longer integrated; see `stuck_after`."""
+STUCK_PERIODS = 0.25
+"""Periods of equal readings after which it is not; chosen: the displacement is then at most 2.2 times the true one."""
 
 UNCERTAIN_PERIODS = 1.5
-"""Periods after a loss in which the displacement is corrected; chosen: a difference has then fallen to 0.1 %."""
+"""Periods after a loss, or after equal readings, in which the displacement is corrected; chosen: a difference has then fallen
+to 0.1 %."""
 
 
 @kernel
@@ -26,11 +30,32 @@ def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tupl
     """
     guard, limits, loop = t.guard[0], t.limits[0], t.loop[0]
     channel, watch = t.inputs[index], t.watches[index]
+    longest = stuck_after(t)
+    was_stuck = watch.same_samples >= longest
     usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
     within = usable and abs(volts * channel.unit_per_volt) <= channel.limit
     if not within or (guard.channel == index and guard.reason >= EndReason.SENSOR_OVERLOAD):
         watch.distrusted = 1
-    return usable, watch.distrusted == 0 and watch.same_samples < STUCK_SAMPLES
+    stuck = watch.same_samples >= longest
+    if was_stuck and not stuck:
+        loop.uncertain = uncertain_samples(t)
+    return usable, watch.distrusted == 0 and not stuck
+
+
+@kernel
+def stuck_after(t: TickArrays) -> int:
+    """Return after how many equal readings a channel's motion is no longer integrated.
+
+    At the turning points of a vibration of A steps of the converter, ``sqrt(2 / A) / pi`` of a period read the same. Leaving
+    these readings out would be a drift of the displacement.
+    """
+    return max(STUCK_SAMPLES, round(STUCK_PERIODS * TWO_PI / (dominant_omega(t) * t.loop[0].dt_s)))
+
+
+@kernel
+def uncertain_samples(t: TickArrays) -> int:
+    """Return for how many samples the displacement is corrected after a loss."""
+    return round(UNCERTAIN_PERIODS * TWO_PI / (dominant_omega(t) * t.loop[0].dt_s))
 
 
 @kernel
@@ -61,9 +86,9 @@ def read_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
                 continue
             if watch.overload_samples > 0:
                 flags |= SENSOR_AT_RANGE
-        mean = track(watch.mean, value, mean_gain)
-        watch.mean = mean
-        value -= mean
+        if moves:
+            watch.mean = track(watch.mean, value, mean_gain)
+        value -= watch.mean
         if index == loop.force_channel:
             force = value
         if index == loop.drive_channel:
@@ -96,7 +121,7 @@ def bridge_lost_sample(t: TickArrays, readings: np.ndarray, cos_theta: float, si
     readings[:] = math.nan
     loop.lost += 1
     omega = dominant_omega(t)
-    loop.uncertain = round(UNCERTAIN_PERIODS * TWO_PI / (omega * dt))
+    loop.uncertain = uncertain_samples(t)
     cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
     for index in range(t.inputs.size):
         if t.inputs[index].watch_displacement == 1:

@@ -8,6 +8,7 @@ import pytest
 
 from controller import AmplitudeLaw, preset
 from rig.tick.measure import bridge_lost_sample, read_inputs
+from rig.tick.safety.layout import EndReason
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick, TickSettings
@@ -18,7 +19,15 @@ FORCE, DRIVE = cmath.rect(3.0, 0.7), cmath.rect(20.0, -1.1)
 
 @pytest.fixture
 def tick():
-    bench = bench_with()
+    return tick_of(bench_with())
+
+
+@pytest.fixture
+def fast_tick():
+    return tick_of(bench_with({"sample_rate_hz": 48_000.0}))
+
+
+def tick_of(bench):
     segments = [Segment(SegmentKind.RAMP, -1, 0.5, 2.0), Segment(SegmentKind.HOLD, -1, 0.5, 1000.0)]
     made = Tick(TickSettings(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), segments), 1.5)
     vibration = made.arrays.control["vibration"]
@@ -83,3 +92,43 @@ def test_a_vibration_that_goes_on_with_another_phase_after_a_loss_feigns_no_disp
     assert sizes[:period].max() == pytest.approx(1.0, rel=0.02)
     assert sizes[period:].max() < (1.2 if abs(jump_deg) < 90.0 else 1.4)
     assert sizes[-period:].max() == pytest.approx(1.0, rel=0.1)
+
+
+def displacements(tick, acceleration_of, samples, step):
+    """Displacement of the drive channel after every sample, m, if its readings have steps of this size, m/s^2."""
+    arrays = tick.arrays
+    channel = int(arrays.loop["drive_channel"][0])
+    arrays.loop["held"] = 1
+    volts, readings, seen = np.zeros(len(arrays.inputs)), np.zeros(len(arrays.inputs)), []
+    for sample in range(samples):
+        stepped = step * round(min(sample / 48_000, 1.0) * acceleration_of(sample) / step)
+        volts[:] = 1e-6 * (sample % 2)  # the other sensors do not stand still
+        volts[channel] = stepped / arrays.inputs["unit_per_volt"][channel]
+        read_inputs(arrays, volts, readings)
+        seen.append(arrays.watches["displacement"][channel])
+    assert tick.guard["reason"][0] == EndReason.NONE
+    return np.array(seen)
+
+
+@pytest.mark.parametrize("steps", [12.0, 40.0, 1500.0])
+def test_equal_readings_at_turning_points_are_no_drift(fast_tick, steps):
+    """At 48 kHz and 24 Hz, 12 to 150 readings in a row are equal there."""
+    rate, omega, size_m = 48_000, 2.0 * math.pi * 24.0, 1e-3
+    size = size_m * omega**2
+    seen = displacements(fast_tick, lambda n: size * math.cos(omega * n / rate), 4 * rate, size / steps)
+    last = seen[-rate:].reshape(-1, 2000)  # periods
+    assert np.abs(last).max(axis=1) == pytest.approx(size_m, rel=0.03)
+    assert np.abs(last.mean(axis=1)).max() < 0.02 * size_m
+
+
+@pytest.mark.parametrize("at_deg", [0.0, 45.0, 90.0, 180.0])
+def test_a_sensor_that_stands_still_for_a_while_feigns_little_displacement(fast_tick, at_deg):
+    rate, omega, size_m = 48_000, 2.0 * math.pi * 24.0, 1e-3
+    size, first = size_m * omega**2, 2 * rate + round(at_deg / 360.0 * rate / 24.0)
+
+    def reading(n):
+        return size * math.cos(omega * (first if first <= n < first + 0.2 * rate else n) / rate)
+
+    seen = np.abs(displacements(fast_tick, reading, 3 * rate, size / 3000.0))
+    assert seen[first:].max() < 2.3 * size_m
+    assert seen[-2000:].max() == pytest.approx(size_m, rel=0.3)
