@@ -15,6 +15,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "gallery_pages",
     "mathml",
     "reference",
     "sphinx_copybutton",
@@ -44,6 +45,7 @@ toc_object_entries = False
 html_theme = "pydata_sphinx_theme"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_search_scorer = "_static/scorer.js"
 html_title = f"vibrolock {release}"
 html_theme_options = {
     "show_nav_level": 1,
@@ -74,6 +76,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "write_computation_times": False,
     "min_reported_time": 600,
+    "image_scrapers": ("gallery_pages.scraper",),
     "thumbnail_size": (480, 300),
     "log_level": {"backreference_missing": "info"},
 }

@@ -65,6 +65,8 @@ class Keys(Generated):
         if name not in tables():
             raise self.error(f"there is no table {name!r}: {', '.join(tables())}")
         out = self.parsed(self._markdown(name))
+        for table in out:
+            table["classes"].append("keys")
         cells = [row[0] for table in out for body in table.findall(nodes.tbody) for row in body]
         for key, cell in zip(keys_of(name), cells, strict=True):
             cell.insert(0, self.target("key", f"{name}.{key.name}", key.anchor))

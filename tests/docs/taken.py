@@ -32,6 +32,7 @@ TAKES: dict[str, dict[str, tuple[str, ...]]] = {
         SWEEP: ("sweep-test.toml", "sweep.h5"),
         EXCITER: ("exciter.h5",),
     },
+    "docs/how-to/which-model.md": {RECORDINGS: ("backbone.h5",), EXCITER: ("exciter.h5",)},
     "docs/how-to/export-to-other-programs.md": {RECORDINGS: ("backbone.h5", "mode.h5")},
     "docs/how-to/write-a-report.md": {
         RECORDINGS: ("backbone.h5", "mode.h5"),

@@ -52,6 +52,7 @@ NOT_RUN = {
         "docs/how-to/write-a-board.md",
         "take a quarter of an hour to an hour; tests/firmware/test_checks.py and test_differential.py run shorter forms",
     ),
+    ("docs/how-to/from-a-first-cable-to-a-first-backbone.md", "needs the device"),
     ("docs/how-to/write-a-board.md", "a test compiles the board above with these options"),
     ("docs/how-to/test-my-bench-with-pytest.md", "takes half a minute each; tests/hardware runs the same"),
     ("docs/how-to/try-the-firmware.md", "runs until Ctrl-C"),
@@ -94,6 +95,7 @@ SLOW = (
             "predict-with-a-pnlss-model",
             "identify-a-structured-model",
             "fit-runs-that-differ",
+            "which-model",
         )
     ),
 )
