@@ -45,7 +45,7 @@ toc_object_entries = False
 html_theme = "pydata_sphinx_theme"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_search_scorer = "_static/scorer.js"
+html_search_scorer = str(HERE / "_static" / "scorer.js")
 html_title = f"vibrolock {release}"
 html_theme_options = {
     "show_nav_level": 1,

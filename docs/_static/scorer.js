@@ -13,14 +13,14 @@ const PLACES = [
 
 var Scorer = {
   score: ([page, title, , , score, , kind]) => {
-    if (kind === "object") return /[_.]\w*_|_\w|--/.test(title) ? score + 30 : score / 10;
+    if (kind === "object") return score < 100 ? score : /_|--/.test(title.split(".").pop()) ? 40 : 12;
     if (kind === "index" && page === "glossary") return score / 5;
     const place = PLACES.find(([pattern]) => pattern.test(page));
     return score + (place ? place[1] : 0);
   },
-  objNameMatch: 11,
-  objPartialMatch: 6,
-  objPrio: { 0: 15, 1: 5, 2: -5 },
+  objNameMatch: 100,
+  objPartialMatch: 1,
+  objPrio: { 0: 3, 1: 2, 2: 1 },
   objPrioDefault: 0,
   title: 15,
   partialTitle: 7,

@@ -118,12 +118,33 @@ def test_every_page_is_found_by_its_title(built, pages):
     assert set(pages) - known == {"genindex.html", "search.html", "py-modindex.html"} & set(pages)
 
 
+def search_index(built):
+    text = (built[0] / "searchindex.js").read_text(encoding="utf-8")
+    return json.loads(text.removeprefix("Search.setIndex(").rstrip(")"))
+
+
+GUIDES = {
+    "cite": "cite",
+    "duration": "how-to/how-long-will-my-test-take",
+    "ni": "how-to/use-ni-daqmx",
+    "which model": "how-to/which-model",
+    "settle": "how-to/set-the-ramp-and-settling",
+    "random": "reference/what-this-version-does-not-do",
+}
+
+
+@pytest.mark.parametrize("word", GUIDES)
+def test_a_word_that_people_search_for_leads_to_the_page_that_answers(built, word):
+    index = search_index(built)
+    assert GUIDES[word] in {index["docnames"][number] for number, _, main in index["indexentries"][word] if main}
+    assert "var Scorer" in (built[0] / "_static" / "language_data.js").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("word", "page"), [("settl", "reference/keys/settle"), ("multisin", "reference/keys/multisine")]
 )
 def test_the_search_finds_a_word(built, word, page):
-    text = (built[0] / "searchindex.js").read_text(encoding="utf-8")
-    index = json.loads(text.removeprefix("Search.setIndex(").rstrip(")"))
+    index = search_index(built)
     found = index["terms"].get(word, []), index["titleterms"].get(word, [])
     numbers = {number for one in found for number in (one if isinstance(one, list) else [one])}
     assert page in {index["docnames"][number] for number in numbers}
