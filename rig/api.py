@@ -256,6 +256,8 @@ def resume(
         Whether functions of the user that the recorded bench names are imported. They are code chosen by the author of the
         file.
 
+    Notes
+    -----
     Raises `rig.errors.ConfigurationError` for a plan that cannot follow the recorded one or that asks for a level that tripped,
     and `rig.errors.RecordingError` for a file that cannot be read or written.
     """

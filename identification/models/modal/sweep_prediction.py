@@ -122,6 +122,8 @@ def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = 
     name
         Name of the recording in the result.
 
+    Notes
+    -----
     The fundamental of the drive channel (displacement, velocity or acceleration) is divided by the power of the instantaneous
     W that converts it to a displacement. The prediction is smoothed like the recording, which lowers the peak of a fast
     sweep. If the force is by zero crossings, its frequency and phase jump. The predicted displacement is then not smoothed,

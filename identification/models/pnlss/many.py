@@ -197,6 +197,8 @@ def identify_many(
     progress
         Called with each result, the number of finished jobs and the number of all jobs.
 
+    Notes
+    -----
     A failed job gives a result with its reason, and the others continue. After Ctrl-C, or if the iterator is closed early,
     jobs that have not started are dropped. Raises `IdentificationError` if two jobs have the same name.
     """
