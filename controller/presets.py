@@ -32,6 +32,8 @@ def preset(
 ) -> PhaseLockedLoop:
     """Return the paper's controller for a specimen and a test, in reading A (sign detector) or B (two-phase).
 
+    The paper gives no frequency window. This preset uses +-10 % around the specimen's linear frequency (24.37 or 149.0 Hz).
+
     Parameters
     ----------
     specimen
@@ -40,8 +42,6 @@ def preset(
         ``backbone``, or ``stepped-phase`` at constant force.
     reading
         Reading of the paper's phase detector: A (sign) or B (two-phase).
-
-    The paper gives no frequency window. This preset uses +-10 % around the specimen's linear frequency (24.37 or 149.0 Hz).
     """
     k1, k2, k3, k4, centre = _PAPER[specimen, test]
     linear_hz = {"magnet-beam": 24.37, "friction-beam": 149.0}[specimen]

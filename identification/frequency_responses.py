@@ -128,14 +128,14 @@ def unpack_frequency_responses(
 ) -> tuple[FrequencyResponse, ...]:
     """Invert `pack_frequency_responses`.
 
+    Raises `IdentificationError` if something is missing or unknown.
+
     Parameters
     ----------
     arrays
         Arrays by name.
     attributes
         Attributes by name.
-
-    Raises `IdentificationError` if something is missing or unknown.
     """
     try:
         ends = np.cumsum(arrays["points_per_level"])[:-1]

@@ -34,6 +34,9 @@ def ensemble(
 ) -> Iterator[tuple[str, Result]]:
     """Yield ``(name, function(variant))`` for every variant, in their order, as results arrive.
 
+    Raises `VariantError`, naming the variant, if the function fails. After such an error, after Ctrl-C, or if the iterator is
+    closed early, variants that have not begun are dropped.
+
     Parameters
     ----------
     variants
@@ -44,9 +47,6 @@ def ensemble(
         of a run, not the run.
     n_jobs
         As in joblib: a number of workers, -1 for all cores, None for the setting of `joblib.parallel_config`, or else 1.
-
-    Raises `VariantError`, naming the variant, if the function fails. After such an error, after Ctrl-C, or if the iterator is
-    closed early, variants that have not begun are dropped.
     """
     named = variants.items() if isinstance(variants, Mapping) else enumerate(variants)
     calls = (delayed(_outcome)(function, str(name), variant) for name, variant in named)

@@ -229,12 +229,12 @@ class LinearModes(Result):
 def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:
     """float[n_modes of a, n_modes of b]: MAC ``(x^T y)^2 / (x^T x y^T y)`` of the shapes at the common channels.
 
+    Raises `IdentificationError` if the two have no channel in common.
+
     Parameters
     ----------
     a, b
         Linear modes with at least one channel in common.
-
-    Raises `IdentificationError` if the two have no channel in common.
     """
     names = [channel.name for channel in b.channels]
     common = [(row, names.index(channel.name)) for row, channel in enumerate(a.channels) if channel.name in names]

@@ -35,14 +35,14 @@ class BackboneMapping(SpectrumMapping):
 def map_backbone(data: Any, mapping: BackboneMapping) -> Backbone:
     """Return the backbone in ``data`` in SI units and peak values, without static parts, standard errors and residuals.
 
+    Raises `IdentificationError` if a path does not exist, lengths differ, values are NaN, or roles are missing.
+
     Parameters
     ----------
     data
         What a file holds: nested mappings and arrays, as its reader returns them.
     mapping
         Where the quantities lie, in which units.
-
-    Raises `IdentificationError` if a path does not exist, lengths differ, values are NaN, or roles are missing.
     """
     frequency = mapping.frequency_hz(data)
     channels, factors = in_si(mapping.channels)

@@ -62,15 +62,15 @@ class HammerTestMapping(MeasurementMapping):
 def map_hammer_test(data: Any, mapping: HammerTestMapping) -> HammerTest:
     """Return the hammer test in ``data``, evaluated in SI units.
 
+    Raises `IdentificationError` if a path does not exist, lengths differ, sampling is uneven, values are NaN, or as
+    `hammer_test`.
+
     Parameters
     ----------
     data
         What a file holds: nested mappings and arrays, as its reader returns them.
     mapping
         Where the channels lie, in which units, and how the test is evaluated.
-
-    Raises `IdentificationError` if a path does not exist, lengths differ, sampling is uneven, values are NaN, or as
-    `hammer_test`.
     """
     channels, factors = in_si(mapping.channels)
     signs = np.array([-channel.scale if channel.inverted else channel.scale for channel in mapping.channels])

@@ -44,15 +44,15 @@ class MultisineMapping(MeasurementMapping):
 def map_multisine(data: Any, mapping: MultisineMapping) -> PeriodicSpectra:
     """Return the spectra of all realisations, in SI units.
 
+    Samples beyond the last whole period are discarded. Raises `IdentificationError` if a path does not exist, sample rates
+    disagree, sampling is uneven, lengths differ, values are NaN, or there is less than one whole period.
+
     Parameters
     ----------
     data
         What a file holds: nested mappings and arrays, as its reader returns them.
     mapping
         Where the quantities lie, in which units.
-
-    Samples beyond the last whole period are discarded. Raises `IdentificationError` if a path does not exist, sample rates
-    disagree, sampling is uneven, lengths differ, values are NaN, or there is less than one whole period.
     """
     entries = entries_at(data, mapping.realisations, "realisations")
     rate = one_rate_hz(data, entries[0], mapping)

@@ -43,14 +43,14 @@ class NonlinearModeMapping(MeasurementMapping):
 def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMode:
     """Return the mode in ``data`` in SI units and peak values; properties that the table does not give are NaN.
 
+    Raises `IdentificationError` if a path does not exist, lengths differ, values are NaN, or a unit is unknown.
+
     Parameters
     ----------
     data
         What a file holds: nested mappings and arrays, as its reader returns them.
     mapping
         Where the quantities lie, in which units.
-
-    Raises `IdentificationError` if a path does not exist, lengths differ, values are NaN, or a unit is unknown.
     """
     columns = {"frequency": mapping.frequency, "damping": mapping.damping, "amplitude": mapping.amplitude}
     if mapping.force is not None:

@@ -38,14 +38,14 @@ class PnlssMapping(MeasurementMapping):
 def map_pnlss(data: Any, mapping: PnlssMapping) -> PnlssModel:
     """Return the model in ``data``, in SI units; powers have a row per monomial, with columns for states, then inputs.
 
+    Raises `IdentificationError` if a path does not exist, shapes do not fit, values are NaN, or powers are not integers.
+
     Parameters
     ----------
     data
         What a file holds: nested mappings and arrays, as its reader returns them.
     mapping
         Where the quantities lie, in which units.
-
-    Raises `IdentificationError` if a path does not exist, shapes do not fit, values are NaN, or powers are not integers.
     """
     inputs, of_inputs = in_si(mapping.inputs)
     outputs, of_outputs = in_si(mapping.outputs)

@@ -52,14 +52,14 @@ class ResponseMatrixMapping(SpectrumMapping):
 def map_response_matrix(data: Any, mapping: ResponseMatrixMapping) -> FrequencyResponseMatrix:
     """Return the frequency responses in ``data`` in SI units, without a line at 0 Hz that says nothing.
 
+    Raises `IdentificationError` if a path does not exist, shapes or numbers do not fit, or a response is missing.
+
     Parameters
     ----------
     data
         What a file holds: nested mappings and arrays, as its reader returns them.
     mapping
         Where the quantities lie, in which units.
-
-    Raises `IdentificationError` if a path does not exist, shapes or numbers do not fit, or a response is missing.
     """
     frequency = mapping.frequency_hz(data)
     outputs, out_factors = in_si(mapping.outputs)

@@ -36,6 +36,9 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     Raises `IdentificationError` if a path does not exist, dimensions or lengths do not fit the axes, sample rates
     disagree, sampling is uneven, values are NaN, no whole period or sample is left, or periods of the input differ.
 
+    A channel that began later than others by whole samples is lined up with them, and all are cut to the common length.
+    Periodic records are cut to whole periods and resampled without error, others filtered and decimated.
+
     Parameters
     ----------
     data
@@ -45,9 +48,6 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         What is where, and what it means.
     files
         Data of the further files that channels name.
-
-    A channel that began later than others by whole samples is lined up with them, and all are cut to the common length.
-    Periodic records are cut to whole periods and resampled without error, others filtered and decimated.
     """
     every = {"": data, **(files or {})}
     entries = {name: entries_at(one, mapping.records, "records") for name, one in every.items()}

@@ -165,6 +165,11 @@ def harmonic_response(
 ) -> HarmonicResponse:
     """Predict the steady response with all harmonics.
 
+    PNLSS and structured models answer, by harmonic balance and arc-length continuation through folds. ``states`` of a
+    structured model are its modal coordinates, ``state_use`` is the largest displacement of each element over its largest in
+    the training data, and the multipliers are those over a period; its stability does not consider the memory of the
+    support's filter.
+
     Parameters
     ----------
     model
@@ -173,11 +178,6 @@ def harmonic_response(
         Peak force of the fundamental, N.
     options
         The further parameters of `frequency_response`, whose errors are raised.
-
-    PNLSS and structured models answer, by harmonic balance and arc-length continuation through folds. ``states`` of a
-    structured model are its modal coordinates, ``state_use`` is the largest displacement of each element over its largest in
-    the training data, and the multipliers are those over a period; its stability does not consider the memory of the
-    support's filter.
     """
     found = dynamic_model(model)
     return found.harmonic_response(*_request(found, force_n, HarmonicOptions, options))

@@ -18,6 +18,9 @@ def simulated_run(
 ) -> SimulatedRun:
     """Simulate an experiment.
 
+    Raises `IdentificationError` if channels or sample rates of model and experiment differ, or an output is zero where it
+    counts.
+
     Parameters
     ----------
     model
@@ -28,9 +31,6 @@ def simulated_run(
         State before the first sample, float[n_states]; by default rest, or an estimate if the experiment requires it.
     use
         What the experiment is for, as it is stored with the run, such as ``training`` or ``test``.
-
-    Raises `IdentificationError` if channels or sample rates of model and experiment differ, or an output is zero where it
-    counts.
     """
     belongs(model, experiment, f"experiment '{experiment.name}'")
     check_not_zero(experiment, f"experiment '{experiment.name}'")
@@ -57,6 +57,8 @@ def simulated_run(
 def error_spectra(model: Simulator, linear: Simulator | None, experiment: Experiment) -> ErrorSpectra:
     """Return amplitudes by line of a periodic experiment: measurement, noise, model, errors of the model and its linear start.
 
+    Raises `IdentificationError` for an experiment that is not periodic.
+
     Parameters
     ----------
     model
@@ -65,8 +67,6 @@ def error_spectra(model: Simulator, linear: Simulator | None, experiment: Experi
         The linear model with which the fit began; None without one.
     experiment
         A periodic experiment.
-
-    Raises `IdentificationError` for an experiment that is not periodic.
     """
     period = experiment.period_samples
     if not period:
@@ -100,6 +100,8 @@ def output_stretch(
 ) -> OutputStretch:
     """Return some samples around the largest measured value of the first output, and the model's outputs there.
 
+    Raises `IdentificationError` if channels or sample rates of model and experiment differ.
+
     Parameters
     ----------
     model
@@ -110,8 +112,6 @@ def output_stretch(
         Largest number of samples that are returned.
     initial_state
         State before the first sample, float[n_states]; by default rest, or an estimate if the experiment requires it.
-
-    Raises `IdentificationError` if channels or sample rates of model and experiment differ.
     """
     belongs(model, experiment, f"experiment '{experiment.name}'")
     run = run_of(model, experiment, initial_state)

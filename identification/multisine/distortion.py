@@ -90,6 +90,10 @@ def distortion_levels(
 ) -> DistortionLevels:
     """Estimate the distortion of every channel other than the input; the module describes the choice of input.
 
+    Raises `IdentificationError` if there is only one period (noise is unknown), if the instrument has more than a
+    tenth of its largest amplitude at a line that the design does not excite, and in the cases of
+    `best_linear_approximation`.
+
     Parameters
     ----------
     spectra
@@ -98,10 +102,6 @@ def distortion_levels(
         Name of the channel that is taken as the input.
     instruments
         Names of the channels that serve as instruments: noise-free signals that drive the inputs.
-
-    Raises `IdentificationError` if there is only one period (noise is unknown), if the instrument has more than a
-    tenth of its largest amplitude at a line that the design does not excite, and in the cases of
-    `best_linear_approximation`.
     """
     realisations, periods = spectra.spectra.shape[:2]
     if periods < 2:

@@ -37,6 +37,9 @@ class HalfPeriods:
 def zero_crossings(signal: ArrayLike, *, sample_rate_hz: float, whole_periods: bool = False) -> HalfPeriods:
     """Find the periods of a signal between zero crossings, which are interpolated linearly between samples.
 
+    Raises `IdentificationError` if values are NaN or infinite, or there are
+    fewer than two crossings.
+
     Parameters
     ----------
     signal
@@ -46,9 +49,6 @@ def zero_crossings(signal: ArrayLike, *, sample_rate_hz: float, whole_periods: b
     whole_periods
         Whether only upward crossings count. A mean or an even harmonic, which makes both halves of a period unequal, then
         does not affect the frequency.
-
-    Raises `IdentificationError` if values are NaN or infinite, or there are
-    fewer than two crossings.
     """
     values = finite_array("signal", signal, np.float64, 1)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")

@@ -39,15 +39,15 @@ def driver_names() -> list[str]:
 def make_daq(bench: Bench, seed: int = 0) -> DAQ:
     """Return the driver that a bench asks for, not yet open.
 
+    Raises `ConfigurationError` for an unknown name, a driver that cannot be imported, or options it refuses; `DaqError` for
+    any other exception of it.
+
     Parameters
     ----------
     bench
         The bench.
     seed
         Seed of the noise of a virtual rig.
-
-    Raises `ConfigurationError` for an unknown name, a driver that cannot be imported, or options it refuses; `DaqError` for
-    any other exception of it.
     """
     name = bench.driver.name
     found = _shipped() if name in _shipped() else _found()

@@ -75,6 +75,11 @@ def telemetry(
 ) -> "xarray.Dataset":
     """Return recorded rows over time: input channels by their names, and the other columns of the rows.
 
+    The dimension is ``time`` (s from the beginning of the part; not evenly spaced where the plan stores one row of several).
+    Every variable has ``units`` and ``long_name``, channels also ``role``. Lost samples are NaN in the channels.
+
+    Raises `RecordingError` for a column, part, point or number that there is not, ImportError without xarray.
+
     Parameters
     ----------
     recording
@@ -89,11 +94,6 @@ def telemetry(
         Time from the beginning of the part, s; ``to_s`` itself is left out.
     every
         One row of so many. It is not filtered: what vibrates faster than half of the remaining rate aliases.
-
-    The dimension is ``time`` (s from the beginning of the part; not evenly spaced where the plan stores one row of several).
-    Every variable has ``units`` and ``long_name``, channels also ``role``. Lost samples are NaN in the channels.
-
-    Raises `RecordingError` for a column, part, point or number that there is not, ImportError without xarray.
     """
     try:
         import xarray

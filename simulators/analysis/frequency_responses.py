@@ -43,6 +43,8 @@ class FrequencyResponses:
 def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool = False) -> FrequencyResponses:
     """Return the linear frequency responses at some frequencies.
 
+    Raises `ValueError` if a frequency is not above 0 or, with ``held``, not below half the sample rate.
+
     Parameters
     ----------
     rig
@@ -53,8 +55,6 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
         Whether the voltage is held by the converter between samples. The images of the held voltage above half the sample
         rate, which sampling folds back, are then included. Near a lightly damped resonance the force is so small that these
         images matter.
-
-    Raises `ValueError` if a frequency is not above 0 or, with ``held``, not below half the sample rate.
     """
     frequencies = positive("frequencies_hz", frequencies_hz)
     plant, points, rate_hz = rig.plant, rig.structure.points, rig.converter.sample_rate_hz

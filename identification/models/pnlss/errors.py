@@ -26,6 +26,11 @@ def pnlss_errors(
 ) -> PnlssErrors:
     """Simulate each experiment and compare.
 
+    A model of another kind begins from rest, or as it does itself (`identification.experiments.simulators.Follower`).
+
+    Raises `IdentificationError` if there are no experiments, their channels or sample rates differ from the model's, or an
+    output is zero where it counts.
+
     Parameters
     ----------
     model
@@ -34,11 +39,6 @@ def pnlss_errors(
         The experiments.
     samples
         Number of samples to which an initial state is fitted, where an experiment wants one to be estimated.
-
-    A model of another kind begins from rest, or as it does itself (`identification.experiments.simulators.Follower`).
-
-    Raises `IdentificationError` if there are no experiments, their channels or sample rates differ from the model's, or an
-    output is zero where it counts.
     """
 
     def simulate(experiment: Experiment) -> Simulation:
@@ -53,6 +53,11 @@ def pnlss_errors(
 def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, samples: int = SAMPLES) -> Float:
     """Return the state before the first sample, float[n_states], by least squares, each output over its RMS.
 
+    Unobservable combinations of states stay near zero. For this the states are scaled so that each alone has an equal effect
+    on the outputs; the result then depends neither on the units of the states nor on a known range.
+
+    Raises `IdentificationError` on other channels, another sample rate, too few samples.
+
     Parameters
     ----------
     model
@@ -61,11 +66,6 @@ def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, sample
         The experiment; its channels and sample rate are those of the model.
     samples
         Number of samples from the first that counts on, to which the outputs are fitted.
-
-    Unobservable combinations of states stay near zero. For this the states are scaled so that each alone has an equal effect
-    on the outputs; the result then depends neither on the units of the states nor on a known range.
-
-    Raises `IdentificationError` on other channels, another sample rate, too few samples.
     """
     belongs(model, experiment, f"experiment{f' ({experiment.name})' if experiment.name else ''}")
     if not samples * len(model.outputs) >= model.states:

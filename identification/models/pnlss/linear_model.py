@@ -122,6 +122,9 @@ def linear_pnlss(
 ) -> PnlssModel:
     """Return the initial linear model of a fit, with notes on its accuracy.
 
+    Constant inputs are not part of the best linear approximation; the fit over time identifies their effect. Raised errors are
+    those of `identify_pnlss`.
+
     Parameters
     ----------
     experiments
@@ -132,9 +135,6 @@ def linear_pnlss(
         A linear model to begin with, in place of one from the best linear approximation.
     band_hz
         Lowest and highest frequency that counts, Hz.
-
-    Constant inputs are not part of the best linear approximation; the fit over time identifies their effect. Raised errors are
-    those of `identify_pnlss`.
     """
     same_channels(experiments)
     first = experiments[0]

@@ -70,15 +70,15 @@ class Bound:
 def bound_of(model: StructuredModel, force_rms_n: float) -> Bound:
     """Return the lowest bound that the tried constants give, for a model with one force.
 
+    Not included: steps whose equation is not solved (`Motion.unsolved_steps` counts them).
+    Raises `IdentificationError` if the force is not above zero.
+
     Parameters
     ----------
     model
         A structured model with one force.
     force_rms_n
         RMS of the force, N; above zero.
-
-    Not included: steps whose equation is not solved (`Motion.unsolved_steps` counts them).
-    Raises `IdentificationError` if the force is not above zero.
     """
     force = positive("force_rms_n", force_rms_n)
     system = model.system

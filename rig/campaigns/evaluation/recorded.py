@@ -81,15 +81,15 @@ def settled_backbone(recording: Recording, phase_lag_target_deg: float) -> Backb
 def point_rows(recording: Recording, number: int) -> np.ndarray:
     """Return all recorded rows of a point.
 
+    The rows are a structured array with the inputs in SI units (`rig.tick.layout.recorded_row`). Raises `RecordingError` if
+    there is no such point or nothing was recorded of it; the message counts points from 1.
+
     Parameters
     ----------
     recording
         The recording.
     number
         Stored number of the point, which counts from 0.
-
-    The rows are a structured array with the inputs in SI units (`rig.tick.layout.recorded_row`). Raises `RecordingError` if
-    there is no such point or nothing was recorded of it; the message counts points from 1.
     """
     for part in reversed(recording.parts):
         for table in part.points:

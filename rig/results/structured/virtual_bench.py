@@ -64,6 +64,18 @@ def bench_like(name_or_path: str, *, trust_code: bool = False) -> Bench:
 def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -> Table:
     """Return the table of a bench whose virtual specimen is a structured model.
 
+    All outputs become accelerometers. The support of the model is left out, as the exciter's suspension stands there itself. A
+    feed-through from the force to its acceleration, ``direct``, is the mass line of modes below the band: above a hundredth of
+    that of the modes, it becomes a free mode that only the exciter holds; else it is left out. Beyond the reach forces are
+    straight lines, and samples are flagged.
+
+    Raises
+    ------
+    ConfigurationError
+        If the bench has no exciter and no shaker is given, or the parts do not fit together.
+    IdentificationError
+        If the model has not one input and a drive output at its place, or a force at rest.
+
     Parameters
     ----------
     model
@@ -76,18 +88,6 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
         stinger and converter, too.
     shaker
         A shaker by its name (`rig list`) in place of the bench's; a bench that is not virtual needs one.
-
-    All outputs become accelerometers. The support of the model is left out, as the exciter's suspension stands there itself. A
-    feed-through from the force to its acceleration, ``direct``, is the mass line of modes below the band: above a hundredth of
-    that of the modes, it becomes a free mode that only the exciter holds; else it is left out. Beyond the reach forces are
-    straight lines, and samples are flagged.
-
-    Raises
-    ------
-    ConfigurationError
-        If the bench has no exciter and no shaker is given, or the parts do not fit together.
-    IdentificationError
-        If the model has not one input and a drive output at its place, or a force at rest.
     """
     drive = _drive_of(model)
     points = {f"element_{number}": element for number, element in enumerate(model.elements, 1)}
