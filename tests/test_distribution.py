@@ -62,7 +62,7 @@ def tracked(*folders):
 def test_a_wheel_holds_all_modules_benches_plans_specimens_the_page_templates_and_type_markers(built):
     names = set(zipfile.ZipFile(built[0]).namelist())
     wanted = {name for name in tracked(*PACKAGES) if not name.endswith((".nbi", ".nbc"))}
-    assert {"rig/monitor/page/index.html", "rig/monitor/page/uplot/uPlot.iife.min.js"} <= wanted
+    assert {"rig/monitor/page/index.html", "rig/drawing/interactive/uplot/uPlot.iife.min.js"} <= wanted
     assert {"rig/bench/shipped/magnet-beam.toml", "rig/campaigns/shipped/magnet-beam/backbone.toml"} <= wanted
     assert {"simulators/specimens/magnet-beam.toml", "rig/authoring/starts/bench.toml"} <= wanted
     assert {f"{package}/py.typed" for package in PACKAGES} <= wanted

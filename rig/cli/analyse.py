@@ -20,7 +20,7 @@ app = typer.Typer(cls=Group, no_args_is_help=True, help="What can be known of a 
 
 BenchName = Annotated[str, typer.Option("--bench", help="Shipped bench or TOML file, with the virtual driver.")]
 NearHz = Annotated[float | None, typer.Option(help="Mode under test, nearest to this, Hz; default: the bench's.")]
-Figure = Annotated[Path | None, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")]
+Figure = Annotated[Path | None, typer.Option("-o", "--output", help="Figure to write: .png, .pdf, .svg or .html.")]
 Json = Annotated[bool, typer.Option("--json", help="Print all numbers as one JSON document; complex as pairs re, im.")]
 Harmonics = Annotated[int, typer.Option(help="Highest harmonic that is balanced.", min=1, max=200)]
 FromHz = Annotated[float | None, typer.Option(help="Lowest frequency, Hz.")]

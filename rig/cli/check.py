@@ -25,7 +25,7 @@ def check_(
         float | None,
         typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found by itself if left out."),
     ] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf, .svg or .html.")] = None,
     options: "RunOptions",
     json: Json = False,
 ) -> None:

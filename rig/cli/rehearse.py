@@ -42,7 +42,7 @@ def rehearse_(
     compare: Annotated[
         Path | None, typer.Option(metavar="RECORDING", help="Where a run lies within a rehearsal.")
     ] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf, .svg or .html.")] = None,
     jobs: Annotated[int, typer.Option(help="Processes; -1 for one a core.")] = -1,
     overwrite: Overwrite = False,
     json: Json = False,

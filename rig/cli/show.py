@@ -17,7 +17,9 @@ def show(
 
 def plot_(
     files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Recordings, models or imported measurements.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf, .svg, or .html to zoom.")
+    ],
     label: Annotated[list[str] | None, typer.Option(help="Name in the legend; once for each file.")] = None,
     amplitude: Annotated[str | None, typer.Option(help="Axis of amplitudes: linear, log or dB.")] = None,
     channel: Annotated[str, typer.Option(help="Sensor to show; by default the drive point.")] = "",

@@ -38,7 +38,7 @@ def tune_(
     recording: Annotated[
         Path | None, typer.Option(help="Recording of the multisine; beside the plan if left out.")
     ] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf, .svg or .html.")] = None,
     rehearse: Annotated[
         int, typer.Option(metavar="N", help="Twins on which the plan is rehearsed; 0 for none.", min=0, max=100_000)
     ] = 40,

@@ -6,6 +6,9 @@ import numpy as np
 
 from rig.drawing.style import Axes
 
+DAMPING_SPAN = 0.03
+"""Smallest part of a damping ratio that its axis spans: a change below a per cent looks flat, one of 2 % fills the axis."""
+
 
 def log_axis(axis: Axes, which: Literal["x", "y"] = "y", *, least_span: float = 2.0) -> None:
     """Make an axis logarithmic that spans at least a factor, with plain numbers at 1, 2, 5 where it spans few decades."""

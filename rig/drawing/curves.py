@@ -82,7 +82,11 @@ class Line(NamedTuple):
     half_95: Float | None = None
     """float[n]: half of the 95 % interval of ``y``; None if unknown."""
     folded: NDArray[np.bool_] | None = None
-    """bool[n]: points of a branch that is unstable at constant force; None where this is not known."""
+    """bool[n]: points of a branch that is unstable at constant force or, of a model, unstable; None where this is not known."""
+
+
+Origin = Literal["measured", "model", "reference"]
+"""Where curves come from: a measurement; a model or its prediction; the measurement that a prediction holds beside it."""
 
 
 class Trace(NamedTuple):
@@ -92,6 +96,10 @@ class Trace(NamedTuple):
     """Name of the level or pass; empty if the file has one only."""
     lines: tuple[Line, ...]
     """One for each panel."""
+    origin: Origin = "measured"
+    """Measurements are drawn as markers where there are models, which are lines."""
+    notes: tuple[str, ...] = ()
+    """Of each point what is told to who points at it; empty if nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -134,10 +142,13 @@ def peak(
     return Quantity(f"amplitude of {channel.name}{which}", channel.unit, "amplitude"), values
 
 
-def backbone_curves(modes: Sequence[tuple[Backbone | None, NonlinearMode]], view: View, omitted: str = "") -> Curves:
+def backbone_curves(
+    modes: Sequence[tuple[Backbone | None, NonlinearMode]], view: View, omitted: str = "", notes: Sequence[str] = ()
+) -> Curves:
     """Return modal frequency and damping over the amplitude, with 95 % intervals.
 
-    ``modes`` come with the backbones that they were identified from where the file holds these; several are repeats.
+    ``modes`` come with the backbones that they were identified from where the file holds these; several are repeats. Without
+    its backbone a mode is a model. ``notes`` are those of the points of a single mode.
     """
     traces, across = [], DISPLACEMENT
     for number, (measured, mode) in enumerate(modes, 1):
@@ -152,7 +163,9 @@ def backbone_curves(modes: Sequence[tuple[Backbone | None, NonlinearMode]], view
             Line(amplitude[order], scale * getattr(mode, name)[order], scale * mode.bound_95(name)[order])
             for name, scale in (("modal_frequency_hz", 1.0), ("damping_ratio", 100.0))
         )
-        traces.append(Trace(f"repeat {number}" if len(modes) > 1 else "", lines))
+        name = f"repeat {number}" if len(modes) > 1 else ""
+        told = tuple(notes[n] for n in order) if len(notes) == order.size else ()
+        traces.append(Trace(name, lines, "model" if measured is None else "measured", told))
     panels = (
         Panel(across, Quantity("modal frequency", "Hz", "frequency")),
         Panel(across, Quantity("modal damping ratio", "%")),
@@ -160,7 +173,9 @@ def backbone_curves(modes: Sequence[tuple[Backbone | None, NonlinearMode]], view
     return Curves(panels, tuple(traces), modes[0][1].specimen, omitted)
 
 
-def transfer_curves(levels: Mapping[str, FrequencyResponseMatrix], view: View, omitted: str = "") -> Curves:
+def transfer_curves(
+    levels: Mapping[str, FrequencyResponseMatrix], view: View, omitted: str = "", origin: Origin = "measured"
+) -> Curves:
     """Return the frequency response from the force to the channel at each level: size and phase."""
     view.only("channel", of="a frequency response has no harmonics; they are in the scatter over realisations")
     panels: tuple[Panel, ...] = ()
@@ -177,5 +192,6 @@ def transfer_curves(levels: Mapping[str, FrequencyResponseMatrix], view: View, o
             Panel(FREQUENCY, Quantity("phase", "deg")),
         )
         degrees = (np.degrees(np.angle(value)) + 90.0) % 360.0 - 90.0  # the curve has no jump at 0 or 180 deg
-        traces.append(Trace(name, (Line(matrix.frequency_hz, np.abs(value)), Line(matrix.frequency_hz, degrees))))
+        lines = (Line(matrix.frequency_hz, np.abs(value)), Line(matrix.frequency_hz, degrees))
+        traces.append(Trace(name, lines, origin))
     return Curves(panels, tuple(traces), next(iter(levels.values())).specimen, omitted)

@@ -1,11 +1,13 @@
 """Figure of a nonlinear mode: modal properties over the amplitude, and the harmonics of the force."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from identification import NonlinearMode
-from rig.drawing.axes import widen
+from rig.drawing.axes import DAMPING_SPAN, widen
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, engineering, say_why_empty, title
 
@@ -78,12 +80,16 @@ def _draw_purity(axis: Axes, mode: NonlinearMode) -> None:
     axis.legend(title="fundamental over RMS of all")
 
 
-def draw_properties(left: Axes, right: Axes, mode: NonlinearMode, colour: str = MAIN) -> None:
-    """Draw modal frequency and damping over the amplitude, with their 95 % intervals."""
+def draw_properties(left: Axes, right: Axes, mode: NonlinearMode, notes: Sequence[str] = ()) -> None:
+    """Draw modal frequency and damping over the amplitude, with their 95 % intervals; ``notes``: what is told of each point."""
     order = np.argsort(mode.amplitude_m)
+    told = tuple(notes[n] for n in order) if len(notes) == order.size else ()
     amplitude, unit = engineering(mode.amplitude_m[order])
-    error: dict[str, Any] = {"fmt": "o-", "color": colour}
-    left.errorbar(amplitude, mode.modal_frequency_hz[order], mode.bound_95("modal_frequency_hz")[order], **error)
+    error: dict[str, Any] = {"fmt": "o-", "color": MAIN}
+    drawn = left.errorbar(
+        amplitude, mode.modal_frequency_hz[order], mode.bound_95("modal_frequency_hz")[order], **error
+    )
+    note_points(drawn[0], told)
     left.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
     if np.isfinite(mode.damping_ratio).any():
         own = "one-mode fit" if mode.source == "stepped sine" else "from the fundamental's power"
@@ -93,12 +99,13 @@ def draw_properties(left: Axes, right: Axes, mode: NonlinearMode, colour: str = 
         ):
             damping = 100 * getattr(mode, name)[order]
             if np.isfinite(damping).any():
-                right.errorbar(amplitude, damping, 100 * mode.bound_95(name)[order], label=label, **style)
+                drawn = right.errorbar(amplitude, damping, 100 * mode.bound_95(name)[order], label=label, **style)
+                note_points(drawn[0], told)
         right.legend()
     else:
         say_why_empty(right, "damping needs the specimen's drive_mode_shape")
     right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
-    widen(right, 0.15)
+    widen(right, DAMPING_SPAN)
     right.set_ylim(bottom=max(0.0, right.get_ylim()[0]))
 
 

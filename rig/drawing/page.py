@@ -11,6 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from rig.drawing.interactive.document import MARK, document
+from rig.drawing.layout import page_layout
 from rig.drawing.style import STYLE, Artist, Axes, Figure, height_is_free, lines_on, page_in, points
 from rig.errors import RecordingError
 
@@ -27,20 +29,22 @@ _MARKS = {
     ".pdf": ({"Creator": "vibrolock"}, b"/Creator (vibrolock)"),
     ".svg": ({"Creator": "vibrolock"}, b"<dc:title>vibrolock</dc:title>"),
 }
-"""By the suffix of a figure: what it says of who made it, and how that stands in its file."""
+"""By the suffix of a picture: what it says of who made it, and how that stands in its file."""
+_HTML = ".html"
 COLLAPSED = "constrained_layout not applied"
 """Beginning of what matplotlib warns of where axes have no room."""
 
 
 def check_ending(figure: Path) -> None:
     """Raise `RecordingError` unless ``figure`` ends as figures do."""
-    if figure.suffix.lower() not in _MARKS:
-        raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+    if figure.suffix.lower() not in (*_MARKS, _HTML):
+        raise RecordingError(f"{figure}: figures are written as .png, .pdf, .svg or .html")
 
 
 def check_replaceable(figure: Path) -> None:
     """Raise `RecordingError` for a file that exists and is no figure of this program."""
-    mark = _MARKS[figure.suffix.lower()][1]
+    suffix = figure.suffix.lower()
+    mark = MARK.encode() if suffix == _HTML else _MARKS[suffix][1]
     try:
         ours = not figure.is_file() or mark in figure.read_bytes()
     except OSError as error:
@@ -53,7 +57,7 @@ def check_replaceable(figure: Path) -> None:
 
 @contextmanager
 def page_for(file: Path, size_in: tuple[float, float]) -> Iterator[Figure]:
-    """Give an empty page, and write what has been drawn on it into a file (png, pdf or svg, by its suffix).
+    """Give an empty page, and write what has been drawn on it into a file (png, pdf, svg or html, by its suffix).
 
     ``size_in`` is the size of this figure (inches); `rig.drawing.style.restyle` can ask for another page.
     Raises `RecordingError` if the file cannot be written.
@@ -62,11 +66,14 @@ def page_for(file: Path, size_in: tuple[float, float]) -> Iterator[Figure]:
     from matplotlib.figure import Figure
 
     with mpl.rc_context(STYLE):
-        page = Figure(figsize=page_in(size_in), layout="constrained")
+        page = Figure(figsize=page_in(size_in), layout=page_layout())
         yield page
         _lay_out(page)
         try:
-            page.savefig(file, metadata=_MARKS[file.suffix.lower()][0])
+            if file.suffix.lower() == _HTML:
+                file.write_text(document(page), encoding="utf-8", newline="\n")
+            else:
+                page.savefig(file, metadata=_MARKS[file.suffix.lower()][0])
         except OSError as error:
             raise RecordingError(f"{file}: cannot be written: {error.strerror}") from None
 
@@ -82,7 +89,7 @@ def svg_of(draw: Callable[[Figure], None], size_in: tuple[float, float], name: s
 
     text = io.StringIO()
     with mpl.rc_context({**STYLE, "svg.hashsalt": name, "svg.fonttype": "path"}):
-        page = Figure(figsize=size_in, layout="constrained")
+        page = Figure(figsize=size_in, layout=page_layout())
         draw(page)
         _lay_out(page)
         page.savefig(text, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))

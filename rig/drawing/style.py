@@ -34,6 +34,8 @@ MARKERS = "os^Dv<>P"
 
 _LETTER = 0.56
 """Mean width of a letter over the size of its font (DejaVu Sans)."""
+_LABELS = 5.0
+"""Usual width of what stands left of the axes, their label and the numbers of ticks, over the size of the font."""
 TRACE_BINS = 1200  # parts of a drawn trace of samples; chosen
 _MM_PER_IN = 25.4  # mm in an inch, by definition
 
@@ -209,17 +211,23 @@ def say_why_empty(axis: Axes, text: str) -> None:
 
 
 def title(page: Figure, text: str) -> None:
-    """Write a title at the top left, in as many lines as it needs, unless the text is empty."""
+    """Write a title at the top left, in as many lines as it needs, unless the text is empty.
+
+    The layout of a page puts it at the left edge of the axes (`rig.drawing.layout`).
+    """
     if text:
-        page.suptitle(lines_on(page, text, "figure.titlesize"), x=0.01, ha="left", parse_math=False)
+        beside_axes = _LABELS * points("font.size") / 72.0  # inches
+        shown = lines_on(page, text, "figure.titlesize", page.get_figwidth() - beside_axes)
+        page.suptitle(shown, x=0.01, ha="left", parse_math=False)
 
 
-def lines_on(page: Figure, text: str, setting: str) -> str:
+def lines_on(page: Figure, text: str, setting: str, width_in: float | None = None) -> str:
     """Return a text in lines as long as a page is wide, for the font size of a setting such as ``figure.titlesize``.
 
-    Matplotlib's own wrapping would read ``$`` as the beginning of a formula.
+    Matplotlib's own wrapping would read ``$`` as the beginning of a formula. ``width_in``: inches, in place of the page's.
     """
-    return textwrap.fill(text, max(20, int(0.98 * 72.0 * page.get_figwidth() / (_LETTER * points(setting)))))
+    width_in = page.get_figwidth() if width_in is None else width_in
+    return textwrap.fill(text, max(20, int(0.98 * 72.0 * width_in / (_LETTER * points(setting)))))
 
 
 def points(setting: str) -> float:

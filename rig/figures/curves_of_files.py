@@ -1,12 +1,14 @@
 """Reads the curves of a file: one reader for each family of kinds that have the same axes."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from identification import Backbone, ContinuousBackbone, IdentificationError, nonlinear_mode
-from rig.campaigns.evaluation.figure import refused
+from rig.campaigns.evaluation.drift import without_repetition
+from rig.campaigns.evaluation.figure import notes_of, refused
 from rig.campaigns.evaluation.frequency_responses import passes_of
 from rig.campaigns.evaluation.point import spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
@@ -40,17 +42,16 @@ from rig.results.files import load
 from rig.results.kinds import KINDS
 
 
-def curves_of(path: Path, view: View) -> Curves:
-    """Return the curves of a file.
+def curves_of(path: Path, family: str, view: View) -> Curves:
+    """Return the curves of a file that are of a family which it has (`families_of`).
 
-    Raises `RecordingError` if it cannot be read, has no curves or does not hold what the view asks for, and
+    Raises `RecordingError` if it cannot be read or does not hold what the view asks for, and
     `IdentificationError` if no point was accepted; each names the file.
     """
-    family_of(path)
     kind = kind_of(path)
     try:
         if kind in KINDS:
-            return KINDS[kind].curves_of(load(path), view)
+            return KINDS[kind].curves_of(load(path), family, view)
         with Recording(path) as recording:
             return RECORDED[kind][1](recording, view)
     except IdentificationError as error:
@@ -60,19 +61,53 @@ def curves_of(path: Path, view: View) -> Curves:
         raise error if text.startswith(str(path)) else RecordingError(f"{path}: {text}") from None
 
 
-def family_of(path: Path) -> str:
-    """Return the name of the curves of a file, which can be laid over others of that name; raise `RecordingError` if none."""
+def families_of(path: Path) -> tuple[str, ...]:
+    """Return the families of the curves of a file; those of one family are laid over one another.
+
+    Raises `RecordingError` if there are none.
+    """
     kind = kind_of(path)
     if kind in KINDS:
-        if (curves := KINDS[kind].curves) is not None:
-            return curves[0]
+        if families := KINDS[kind].families(partial(load, path)):
+            return families
+        predicts = KINDS[kind].prediction is not None
     else:
+        predicts = False
         with Recording(path) as recording:
             kind = "check" if is_check(recording) else kind
         if kind in RECORDED:
-            return RECORDED[kind][0]
-    known = ", ".join([*RECORDED, *(name for name, one in KINDS.items() if one.curves is not None)])
-    raise RecordingError(f"{path}: is of kind {kind}, which has no curves to lay over others; {known} have some")
+            return (RECORDED[kind][0],)
+    instead = "; plot it alone" + (", or what it predicts (rig predict)" if predicts else "")
+    raise RecordingError(
+        f"{path}: is of kind {kind}, which has no curves to lay over others or over axes of your own{instead}"
+    )
+
+
+def why_not_together(path: Path, other: Path) -> str:
+    """Return that two files have no common axes and, of a model that predicts what the other holds, how to draw both."""
+    names = [" and ".join(families_of(one)) for one in (path, other)]
+    together = next(filter(None, (_as_prediction(path, other), _as_prediction(other, path))), "")
+    return f"{path} and {other}: {names[0]} and {names[1]} have no common axes; draw them apart{together}"
+
+
+def _as_prediction(model: Path, recording: Path) -> str:
+    """Return how what a model predicts is drawn over a recording; empty if it is no model that predicts such."""
+    kind, measured = kind_of(model), kind_of(recording)
+    prediction = KINDS[kind].prediction if kind in KINDS else None
+    if prediction is None or (measured in KINDS and measured != "frequency-responses"):
+        return ""
+    field, flag = _PREDICTED.get(families_of(recording)[0], ("", ""))
+    if field not in prediction.options.model_fields:
+        return ""
+    return f", or predict first (rig predict {model} {flag} {recording}) and plot that"
+
+
+_PREDICTED = {
+    "frequency responses": ("references", "--reference"),
+    "sweeps": ("sweeps", "--sweep"),
+    "frequency response functions": ("multisines", "--multisine"),
+}
+"""By the family of a recording's curves: field and flag by which a model predicts the recording."""
 
 
 def _backbones(source: Recording, view: View) -> Curves:
@@ -83,7 +118,8 @@ def _backbones(source: Recording, view: View) -> Curves:
         found = measurements[ContinuousBackbone](source)
         return backbone_curves([(ways.backbone, ways.nonlinear_mode()) for ways in found], view, omitted)
     measured = measurements[Backbone](source)
-    return backbone_curves([(measured, nonlinear_mode(measured))], view, omitted)
+    accepted = [point for point in without_repetition(points_of(source)) if point.accepted]
+    return backbone_curves([(measured, nonlinear_mode(measured))], view, omitted, notes_of(accepted))
 
 
 def _responses(source: Recording, view: View) -> Curves:
@@ -117,7 +153,8 @@ def _responses(source: Recording, view: View) -> Curves:
             turned = np.degrees(np.angle(-harmonics[:, force, 1] / harmonics[:, row, 1]))
             lines.append(_broken(Line(frequency_hz, turned, None, folded), breaks))
             panels = (*panels, Panel(FREQUENCY, LAG))
-        found.append(Trace(label, tuple(lines)))
+        told = np.insert(np.array(notes_of(some), object), breaks, "")
+        found.append(Trace(label, tuple(lines), notes=tuple(told)))
     return Curves(panels, tuple(found), specimen_of(source), refused(points))
 
 

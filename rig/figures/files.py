@@ -34,7 +34,7 @@ def plot(
     panels: Sequence[str] = (),
     overwrite: bool = False,
 ) -> None:
-    """Draw the contents of ``source`` into ``figure`` (png, pdf or svg, by its suffix).
+    """Draw the contents of ``source`` into ``figure`` (png, pdf, svg, or html to zoom in a browser, by its suffix).
 
     With ``lateness``, draw the timing of the recording's control loop instead. Of several files, or with ``labels`` or a
     ``view``, draw the curves alone, over one another (`rig.figures.overlay.overlay`). ``panels``: the parts of a recording's

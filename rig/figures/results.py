@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from identification import FrequencyResponse
+from rig.drawing.layout import page_layout
 from rig.drawing.style import STYLE, Axes, Figure, page_in
 from rig.figures.files import FileOptions, drawing_of
 from rig.recording.reader import Recording
@@ -42,7 +43,7 @@ def plot(thing: Any, *others: Any, page: Figure | None = None, **options: Unpack
         if page is None:
             from matplotlib import pyplot
 
-            page = pyplot.figure(figsize=page_in(size_in), layout="constrained")
+            page = pyplot.figure(figsize=page_in(size_in), layout=page_layout())
         draw(page)
     return tuple(page.axes)
 

@@ -20,6 +20,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from rig.drawing import interactive
 from rig.monitor.feed import Feed, Moment, Place
 from rig.monitor.security import Guard, Keys
 from rig.monitor.shutdown_monitor import HARDWARE
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from rig.monitor.folder import Folder
 
 PAGE = Path(__file__).parent / "page"
+UPLOT = Path(interactive.__file__).parent / "uplot"
+"""Scripts of others, which figures in a browser use as well."""
 TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -87,7 +90,9 @@ def application(
 class _Pages:
     def __init__(self, feed: Feed, keys: Keys, secure: bool, folder: "Folder | None", stopping: Stopping) -> None:
         self._feed, self._keys, self._secure, self._folder, self._stopping = feed, keys, secure, folder, stopping
-        files = [path for path in PAGE.rglob("*") if path.suffix in TYPES and path.is_file()]
+        files = [
+            path for folder in (PAGE, UPLOT) for path in folder.iterdir() if path.suffix in TYPES and path.is_file()
+        ]
         self._files = {path.name: (path.read_bytes(), TYPES[path.suffix]) for path in files}
         self._index = Template((PAGE / "index.html").read_text(encoding="utf-8"))
 

@@ -1,7 +1,7 @@
 """Declaration of a kind of result: all that the program knows of it. What it needs is named by an address, imported on use."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
@@ -141,9 +141,9 @@ class ResultKind:
     """Address of the function that draws a result on an empty page, ``(page, result)``."""
     figure_in: tuple[float, float] = (9.0, 6.4)
     """Width and height of the page, inches."""
-    curves: tuple[str, str] | None = None
-    """Family of the curves that can be laid over those of other files, and address of the function that returns them,
-    ``(result, view)``."""
+    curves: Mapping[str, str] = field(default_factory=dict)
+    """By the family of curves that can be laid over those of other files: address of the function that returns them,
+    ``(result, view)``; of several families, it returns None where the result does not have them."""
     exchange: str = ""
     """Address of its `Exchange`; empty: such objects are not exchanged."""
     identification: Identification | None = None
@@ -203,10 +203,18 @@ class ResultKind:
         """Draw a result on an empty page."""
         resolve_name(self.draw)(page, self.as_kept(result))
 
-    def curves_of(self, result: object, view: "View") -> "Curves":
-        """Return the curves of a result; only for kinds that have some."""
-        assert self.curves is not None
-        found: Curves = resolve_name(self.curves[1])(result, view)
+    def families(self, load: Callable[[], object]) -> tuple[str, ...]:
+        """Return the families of curves of a result, which is loaded if the kind has several."""
+        if len(self.curves) < 2:
+            return tuple(self.curves)
+        from rig.drawing.curves import View
+
+        result = load()
+        return tuple(family for family, address in self.curves.items() if resolve_name(address)(result, View()))
+
+    def curves_of(self, result: object, family: str, view: "View") -> "Curves":
+        """Return the curves of a result that are of a family which it has."""
+        found: Curves = resolve_name(self.curves[family])(result, view)
         return found
 
     def objects_of(self, result: object) -> list[Any]:

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 from identification import IdentificationError, nonlinear_mode
 from rig.campaigns.backbone.points import recorded_backbone
-from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading
+from rig.campaigns.evaluation.drift import without_repetition
+from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, notes_of
+from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.areas import is_narrow
 from rig.drawing.axes import widen
 from rig.drawing.nonlinear_mode import draw_properties
@@ -34,6 +36,7 @@ def draw(page: Figure, recording: Recording, panels: Sequence[str] = ()) -> None
         if name == "history":
             draw_history(row[0], row[1], recording)
         else:
-            draw_properties(row[0], row[1], mode)
+            accepted = [point for point in without_repetition(points_of(recording)) if point.accepted]
+            draw_properties(row[0], row[1], mode, notes_of(accepted))
             widen(row[0], LEAST_SPAN)
     heading(page, recording)

@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult
-from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_nothing_is_drawn
+from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, notes_of, why_nothing_is_drawn
 from rig.campaigns.evaluation.point import Point, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.evaluation.stored_point import value_of
-from rig.drawing.axes import log_axis, widen
+from rig.drawing.axes import DAMPING_SPAN, log_axis, widen
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, Axes, Figure, engineering, say_why_empty
 from rig.recording.reader import Recording
@@ -36,7 +37,7 @@ class _Quantity(NamedTuple):
 
 _QUANTITIES = (
     _Quantity("modal frequency, Hz", 1.0, "modal_frequency_hz", "modal_frequency_std_hz", 1e-3),
-    _Quantity("modal damping ratio, %", 100.0, "damping_ratio", "damping_ratio_std", 0.1),
+    _Quantity("modal damping ratio, %", 100.0, "damping_ratio", "damping_ratio_std", DAMPING_SPAN),
 )
 _WAYS = {"up": (SECOND, "^"), "down": (THIRD, "v")}
 """Colour and marker of each way, by the name of its field."""
@@ -165,4 +166,5 @@ def _line(
 ) -> None:
     if points:
         x = [scale_m * vibration_of(point).amplitude_m for point in points]
-        axis.plot(x, values, label=label, marker=marker, color=color, ls=ls, mfc=mfc)
+        (drawn,) = axis.plot(x, values, label=label, marker=marker, color=color, ls=ls, mfc=mfc)
+        note_points(drawn, notes_of(points))

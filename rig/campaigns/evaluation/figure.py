@@ -1,15 +1,16 @@
 """Parts shared by the figures of several kinds of campaigns: the history of the control loop, and a heading."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.point import Point, point_name
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import columns_for, grid, text_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, Axes, Figure, rc, say_why_empty, title
 from rig.recording.parts import Part
@@ -34,6 +35,19 @@ def refused(points: Sequence[Point[object]]) -> str:
         return ""
     names = left_out if len(left_out) == 1 else (f"{count} {name}" for name, count in left_out.items())
     return f"{left_out.total()} not accepted ({', '.join(names)})"
+
+
+def notes_of(points: Iterable[Point[object]]) -> tuple[str, ...]:
+    """Return of each point what a reader is told who points at it: its name, its quality, and its warnings in short."""
+    return tuple(
+        ", ".join(
+            [
+                f"{point_name(point.number)}: {point.quality}",
+                *(text.partition(":")[0] for text in (point.reason, *(point.warnings or ())) if text),
+            ]
+        )
+        for point in points
+    )
 
 
 def why_nothing_is_drawn(points: Sequence[Point[object]]) -> str:
@@ -128,17 +142,19 @@ def _shade_ramp(axis: Axes, seconds: np.ndarray, running: np.ndarray) -> None:
 
 def _mark_points(axis: Axes, part: Part, start: int, rate: float) -> float:
     """Mark the phase error of every recorded fundamental of a part; return the largest absolute value, deg."""
+    found = [one for one in map(point_from, part.points) if one.settled is not None and one.rows and one.lock]
     marks = [
         (0.5 * (point.rows.first_sample + point.rows.end_sample), point.lock.phase_error_deg)
-        for point in map(point_from, part.points)
-        if point.settled is not None and point.rows is not None and point.lock is not None
+        for point in found
+        if point.rows is not None and point.lock is not None
     ]
     if not marks:
         return 0.0
     middles = StoredSamples(part).samples(np.array([middle for middle, _ in marks]))
     seconds = (start + middles) / rate
     degrees = np.array([degrees for _, degrees in marks], float)
-    axis.plot(seconds, degrees, "D", color=SECOND, label="recorded points", zorder=3)
+    (drawn,) = axis.plot(seconds, degrees, "D", color=SECOND, label="recorded points", zorder=3)
+    note_points(drawn, notes_of(found))
     return float(np.max(np.abs(degrees)))
 
 

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import FrequencyResponse
-from rig.campaigns.evaluation.figure import describe
-from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
+from rig.campaigns.evaluation.figure import describe, notes_of
+from rig.campaigns.evaluation.frequency_responses import passes_of, recorded_frequency_responses
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.axes import from_zero
 from rig.drawing.folding import folds_back
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import NARROW_IN, grid, legend_below
 from rig.drawing.style import REJECTED, Axes, Figure, rc, shade, title as heading
 from rig.recording.reader import Recording
@@ -27,6 +28,7 @@ def draw(page: Figure, recording: Recording) -> None:
         recorded_frequency_responses(recording),
         title=describe(recording, "stepped phase"),
         lags_deg=asked_lags(points_of(recording)),
+        notes=[notes_of(some) for _, some in passes_of(points_of(recording))],
     )
 
 
@@ -36,13 +38,14 @@ def draw_stepped_phase(
     *,
     title: str = "",
     lags_deg: Sequence[float] = (),
+    notes: Sequence[tuple[str, ...]] = (),
 ) -> None:
     """Draw displacement amplitude, lag of the displacement, and force over frequency.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement, so the line runs back
     where the response folds over; there it is dotted (`rig.drawing.folding.folds_back`). The line is interrupted where a
     requested lag (``lags_deg``) was not measured. The point nearest to phase resonance is filled. If the force was controlled,
-    its level is a dashed line.
+    its level is a dashed line. ``notes`` are told of the points of each level to who points at them.
     """
     amplitude, lag, force = _panels(page)
     micro = max(float(np.max(item.amplitude_m)) for item in responses) < 5e-4
@@ -50,9 +53,10 @@ def draw_stepped_phase(
     for number, item in enumerate(responses):
         colour, breaks = shade(number, len(responses)), gaps(item.phase_lag_deg, lags_deg)
         label = item.label or f"{item.level:g} {item.level_unit}"
-        _branch(amplitude, item, item.amplitude_m * scale, colour, breaks, label)
-        _branch(lag, item, item.phase_lag_deg, colour, breaks)
-        _branch(force, item, item.force_n, colour, breaks)
+        told = notes[number] if notes else ()
+        _branch(amplitude, item, item.amplitude_m * scale, colour, breaks, told, label)
+        _branch(lag, item, item.phase_lag_deg, colour, breaks, told)
+        _branch(force, item, item.force_n, colour, breaks, told)
         if item.controlled == "force":
             force.axhline(item.level, color=colour, lw=_THIN * rc("lines.linewidth"), ls="--")
     if any(folds_back(item.frequency_hz, item.phase_lag_deg).any() for item in responses):
@@ -105,6 +109,7 @@ def _branch(
     values: NDArray[np.float64],
     colour: object,
     interruptions: NDArray[np.intp],
+    notes: tuple[str, ...],
     label: str | None = None,
 ) -> None:
     """Draw one level in the order of measurement: dotted where it folds back, with its resonant point filled."""
@@ -113,7 +118,7 @@ def _branch(
     for line, elsewhere in (("-", folded), (":", stable)):
         breaks = np.union1d(interruptions, elsewhere).astype(np.intp)
         axis.plot(np.insert(item.frequency_hz, breaks, np.nan), np.insert(values, breaks, np.nan), line, color=colour)
-    axis.plot(item.frequency_hz, values, "o", mfc="white", color=colour)
+    note_points(axis.plot(item.frequency_hz, values, "o", mfc="white", color=colour)[0], notes)
     if label is not None:
         axis.plot([], [], "o-", mfc="white", color=colour, label=label)
     resonant = _resonant(item)

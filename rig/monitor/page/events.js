@@ -24,7 +24,7 @@ export class Events {
     if (this.new.length > KEPT) this.new.splice(0, this.new.length - KEPT);
   }
 
-  /** Entries of a line: time in s, kind, text. */
+  /** Entries of a line: time in s, kind, text in short and, of a point, in full. */
   told(line) {
     if (line.is === "part") {
       const remarks = (line.about?.remarks ?? []).map((text) => [0, "remark", text]);
@@ -34,7 +34,9 @@ export class Events {
     if (line.is === "point") {
       const about = [line.reason, ...(line.warnings ?? [])].filter(Boolean);
       const kind = line.accepted ? (about.length ? "remark" : "point") : "bad";
-      return [[line.end_sample / this.rate, kind, [`point ${line.number + 1} ${line.quality}`, ...about].join(": ")]];
+      const name = `point ${line.number + 1} ${line.quality}`;
+      const brief = about.map((text) => text.split(": ")[0]).join(", ");
+      return [[line.end_sample / this.rate, kind, [name, brief].filter(Boolean).join(": "), [name, ...about].join(": ")]];
     }
     const text = { lock: LOCK, guard: GUARD }[line.what]?.[line.state] ?? line.text ?? [line.what, line.state].filter(Boolean).join(" ");
     return [[line.sample / this.rate, line.state === "lost" ? "bad" : line.what, text]];
@@ -44,16 +46,25 @@ export class Events {
     if (this.anew) this.list.replaceChildren();
     this.anew = false;
     if (!this.new.length) return;
-    const made = this.new.map(([time, kind, text]) => {
+    const made = this.new.map(([time, kind, text, full = text]) => {
       const item = document.createElement("li");
       const when = document.createElement("time");
       when.textContent = Number.isFinite(time) ? `${time.toFixed(2)} s` : "";
       item.className = kind;
-      item.append(when, kind === "bad" || kind === "remark" ? `! ${text}` : text);
+      const shown = kind === "bad" || kind === "remark" ? `! ${text}` : text;
+      item.append(when, full === text ? shown : unfolding(shown, full));
       return item;
     });
     this.list.prepend(...made.reverse());
     this.new = [];
     while (this.list.childElementCount > KEPT) this.list.lastChild.remove();
   }
+}
+
+/** A text in short, which is opened to the full one. */
+function unfolding(text, full) {
+  const [details, summary] = [document.createElement("details"), document.createElement("summary")];
+  summary.textContent = text;
+  details.append(summary, full);
+  return details;
 }

@@ -45,6 +45,9 @@ export const ticks = (_, values) => {
   return values.map((value) => (value == null ? "" : fixed(value, digits)));
 };
 
+/** Width of an axis on the left for the longest of its numbers, at least `least`. */
+export const widthOf = (texts, least) => Math.max(least, 12 + 6.6 * Math.max(0, ...(texts ?? []).map((text) => text.length)));
+
 /** A plot's place in an element of its own. */
 export function place(parent, name, label) {
   const element = document.createElement("div");

@@ -2,13 +2,16 @@
 
 import * as marks from "./marks.js";
 import { ink } from "./palette.js";
-import { around, axis, place, plot, ticks } from "./plot.js";
+import { around, axis, place, plot, ticks, widthOf } from "./plot.js";
+
+const NARROWEST = 48; // pixels of the numbers on the left
 
 export class PointsPlot {
   constructor(parent) {
     this.axes = [];
     this.ranges = [null, null, null];
     [this.points, this.earlier, this.present] = [[], [], null];
+    this.widths = [0, 0, 0];
     this.plots = [1, 2].map((which) => this.make(place(parent, "canvas", "Points"), which));
   }
 
@@ -52,12 +55,18 @@ export class PointsPlot {
       scales: { x: { time: false, range: () => this.ranges[0] ?? [0, 1] }, y: { range: () => this.ranges[which] ?? [0, 1] } },
       axes: [
         axis({ space: 60, ...below }),
-        axis({ size: 48, space: 28, label: () => this.axes[which]?.title ?? "", values: labelled(which) }),
+        axis({ size: (_, texts) => this.width(which, texts), space: 28, label: () => this.axes[which]?.title ?? "", values: labelled(which) }),
       ],
       series: [{}, { stroke: "transparent", points: { show: false } }],
       cursor: { show: false },
       hooks: { draw: [(made) => this.paint(made, which)] },
     });
+  }
+
+  /** Width of the numbers on the left: that of the longer ones of both plots, so that they stand over one another. */
+  width(which, texts) {
+    this.widths[which] = widthOf(texts, NARROWEST);
+    return Math.max(...this.widths);
   }
 
   paint(made, which) {

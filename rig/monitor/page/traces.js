@@ -2,8 +2,9 @@
 
 import { number, quantity, readable } from "./format.js";
 import { faint, ink } from "./palette.js";
-import { around, axis, place, plot, ticks } from "./plot.js";
+import { around, axis, place, plot, ticks, widthOf } from "./plot.js";
 
+const NARROWEST = 58; // pixels of the numbers on the left
 const KEPT = 3000; // bins: five minutes of a test by the clock
 // Chosen by a button: a list that opens would be closed by Esc, which is the key of STOP.
 const SPANS = [
@@ -27,6 +28,7 @@ export class Traces {
   constructor(parent, span) {
     this.span = SPANS[1];
     this.hover = null;
+    this.widths = new Map();
     this.clear();
     this.strips = STRIPS.map((strip, index) => this.make(parent, strip, index === STRIPS.length - 1));
     span.addEventListener("click", () => {
@@ -92,7 +94,7 @@ export class Traces {
       scales: { x: { time: false, range: () => this.range() }, y: { range: (_, low, high) => this.rangeOf(strip, low, high) } },
       axes: [
         axis({ size: lowest ? 22 : 0, values: (_, values) => (lowest && this.time.length ? values.map(clock) : []) }),
-        axis({ size: 58, space: 22, values: (made, all) => (this.time.length ? ticks(made, all) : []) }),
+        axis({ size: (_, texts) => this.width(strip, texts), space: 22, values: (made, all) => (this.time.length ? ticks(made, all) : []) }),
       ],
       series: [{}, line, line],
       bands: [{ series: [1, 2], fill: () => faint(ink[strip.ink], 0.45) }],
@@ -100,6 +102,12 @@ export class Traces {
       hooks: { drawClear: [(made) => this.shade(made)], setCursor: [(made) => this.point(made)] },
     });
     return strip;
+  }
+
+  /** Width of the numbers on the left: that of the longest of all strips, so that they stand over one another. */
+  width(strip, texts) {
+    this.widths.set(strip.key, widthOf(texts, NARROWEST));
+    return Math.max(...this.widths.values());
   }
 
   range() {

@@ -8,5 +8,5 @@ KIND = ResultKind(
     table="rig.results.frequency_response_matrix.views:TABLE",
     draw="rig.results.frequency_response_matrix.views:draw_response_matrix",
     exchange="rig.results.frequency_response_matrix.views:EXCHANGE",
-    curves=("frequency response functions", "rig.results.frequency_response_matrix.views:curves"),
+    curves={"frequency response functions": "rig.results.frequency_response_matrix.views:curves"},
 )

@@ -9,5 +9,5 @@ KIND = ResultKind(
     table="rig.results.frequency_responses.views:TABLE",
     draw="rig.results.frequency_responses.views:draw_responses",
     exchange="rig.results.frequency_responses.views:EXCHANGE",
-    curves=("frequency responses", "rig.results.frequency_responses.views:curves"),
+    curves={"frequency responses": "rig.results.frequency_responses.views:curves"},
 )

@@ -14,6 +14,7 @@ KIND = ResultKind(
     figure_in=(12.0, 8.0),
     exchange="rig.results.linear_modes.views:EXCHANGE",
     exported="rig.results.linear_modes.views:objects_of",
+    curves={"frequency response functions": "rig.results.linear_modes.views:curves"},
     identification=Identification(
         "linear",
         "Linear modes, from multisines, hammer tests or responses.",

@@ -8,6 +8,7 @@ import numpy as np
 from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
 from identification.common import decode, encode
 from rig.drawing.areas import areas
+from rig.drawing.curves import Curves, View, transfer_curves
 from rig.drawing.lines import draw_poles, pooled, without_wraps
 from rig.drawing.style import (
     COLOURS,
@@ -98,11 +99,8 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
         say_why_empty(phase, "")
         return
     frequency = responses.frequency_hz
-    width = modes.damping_ratio * modes.frequency_hz
-    peaks = modes.frequency_hz[:, None] + width[:, None] * np.linspace(-12.0, 12.0, 97)
-    fine = np.union1d(np.geomspace(max(frequency[0], 1e-3), frequency[-1], 2000), peaks)
     fitted = modes.response_matrix(
-        fine[(fine >= modes.lowest_hz) & (fine <= modes.highest_hz)], decay_rate_1_s=responses.decay_rate_1_s
+        _fine_hz(modes, frequency[0], frequency[-1]), decay_rate_1_s=responses.decay_rate_1_s
     )
     every = slice(None, None, max(1, frequency.size // _MOST_DOTS))
     known = {channel.name for channel in modes.channels}
@@ -124,6 +122,21 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
     size.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, handlelength=1.2, borderaxespad=0.2)
     size.tick_params(labelbottom=False)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+
+
+def _fine_hz(modes: LinearModes, low: float, high: float) -> np.ndarray:
+    """Return frequencies, Hz, within the band of the modes, close together where a mode resonates."""
+    width = modes.damping_ratio * modes.frequency_hz
+    peaks = modes.frequency_hz[:, None] + width[:, None] * np.linspace(-12.0, 12.0, 97)
+    fine = np.union1d(np.geomspace(max(low, 1e-3), high, 2000), peaks)
+    return np.asarray(fine[(fine >= modes.lowest_hz) & (fine <= modes.highest_hz)])
+
+
+def curves(found: ModalAnalysis, view: View) -> Curves:
+    """Return size and phase of the response from the force to the channel, as the modes have it within their band."""
+    modes = found.modes
+    fine = _fine_hz(modes, modes.lowest_hz, modes.highest_hz)
+    return transfer_curves({"": modes.response_matrix(fine)}, view, origin="model")
 
 
 def _stabilisation(

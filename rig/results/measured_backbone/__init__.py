@@ -9,5 +9,5 @@ KIND = ResultKind(
     table="rig.results.measured_backbone.views:TABLE",
     draw="rig.results.measured_backbone.views:draw_backbone",
     exchange="rig.results.measured_backbone.views:EXCHANGE",
-    curves=("backbones", "rig.results.measured_backbone.views:curves"),
+    curves={"backbones": "rig.results.measured_backbone.views:curves"},
 )

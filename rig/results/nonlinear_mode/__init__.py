@@ -8,7 +8,7 @@ KIND = ResultKind(
     table="rig.results.nonlinear_mode.views:TABLE",
     draw="rig.drawing.nonlinear_mode:draw_mode",
     figure_in=(12.0, 6.4),
-    curves=("backbones", "rig.results.nonlinear_mode.views:curves"),
+    curves={"backbones": "rig.results.nonlinear_mode.views:curves"},
     exchange="rig.results.nonlinear_mode.views:EXCHANGE",
     identification=Identification(
         "nonlinear-mode",

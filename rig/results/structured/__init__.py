@@ -15,7 +15,7 @@ KIND = ResultKind(
     figure_in=(12.0, 7.5),
     exchange="rig.results.structured.exchange:EXCHANGE",
     exported="rig.results.simulated.model:exported",
-    curves=("backbones", "rig.results.structured.figure:curves"),
+    curves={"backbones": "rig.results.structured.figure:curves"},
     identification=Identification(
         "structured",
         "Modes with nonlinear elements, fitted over time.",

@@ -7,8 +7,10 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from rig.drawing.axes import DAMPING_SPAN, widen
 from rig.drawing.page import grid, page_for
 from rig.drawing.style import COLOURS, REJECTED, STYLE, height_is_free, page_in, restyle, shade, title, unit_text
 from rig.errors import RecordingError
@@ -176,6 +178,30 @@ def test_a_long_title_takes_more_lines_and_stays_on_the_page(tmp_path: Path) -> 
     box = page.get_suptitle() and page._suptitle.get_window_extent()
     assert box.x1 <= page.bbox.width
     assert box.y0 >= axis.get_window_extent().y1
+
+
+@pytest.mark.parametrize("ylabel", ["x", "a label\nin two lines"])
+@pytest.mark.parametrize("size_in", [(9.0, 6.4), (3.35, 3.0)])
+def test_a_title_begins_at_the_left_edge_of_the_axes(tmp_path: Path, ylabel: str, size_in: tuple[float, float]) -> None:
+    with page_for(tmp_path / "figure.png", size_in) as page:
+        axes = page.subplots(1, 2)
+        axes[0].set_ylabel(ylabel)
+        title(page, "a beam")
+    heading = page._suptitle
+    assert heading is not None
+    assert heading.get_window_extent().x0 == pytest.approx(axes[0].bbox.x0, abs=0.02 * page.bbox.width)
+    assert axes[0].bbox.x0 > 0.05 * page.bbox.width  # not the edge of the page
+
+
+@pytest.mark.parametrize(("change", "least", "most"), [(0.025, 0.5, 1.0), (0.2, 0.85, 1.0), (0.001, 0.0, 0.05)])
+def test_an_axis_of_damping_is_neither_padded_nor_shows_scatter_as_a_trend(
+    change: float, least: float, most: float
+) -> None:
+    axis = Figure().subplots()
+    axis.plot([1.0, 2.0], [0.4, 0.4 * (1.0 + change)])
+    widen(axis, DAMPING_SPAN)
+    low, high = axis.get_ylim()
+    assert least < 0.4 * change / (high - low) < most
 
 
 @pytest.mark.parametrize(

@@ -67,8 +67,12 @@ def test_a_model_lies_over_the_recording_that_it_was_made_of(recordings, drawn, 
     path = recordings["continuous-backbone"]
     save(identify_model([path], NonlinearModeOptions()), tmp_path / "model.h5")
     page = drawn(overlay([path, tmp_path / "model.h5"], ["measured", "50 $ model"]))
-    measured, model = (line.get_xydata() for line in page.axes[0].get_lines() if line.get_marker() in ("o", "s"))
-    np.testing.assert_allclose(model, measured, rtol=1e-6)
+    (measured,) = (line for line in page.axes[0].get_lines() if line.get_marker() == "o")
+    (model,) = (line for line in page.axes[0].get_lines() if line.get_linestyle() == "-")
+    assert (measured.get_linestyle(), model.get_marker()) == ("None", "None")
+    np.testing.assert_allclose(model.get_xydata(), measured.get_xydata(), rtol=1e-6)
+    bands = [band for band in page.axes[0].collections if band.get_alpha() == 0.2]
+    assert len(bands) == 1
     assert {"measured", "50 $ model"} <= set(texts(page))
     with refused(RecordingError, "model-channel-acc-magnet-the-file"):
         overlay([path, tmp_path / "model.h5"], view=View(channel="acc_magnet"))
@@ -167,7 +171,11 @@ def test_what_is_not_drawn_is_said(recordings, drawn, monkeypatch):
     [
         (["backbone", "sweep"], {}, "backbones and sweeps have no common axes; draw them apart"),
         (["stepped-sine", "response-controlled"], {}, "have no common axes"),
-        (["dwell"], {}, "is of kind dwell, which has no curves to lay over others; backbone, "),
+        (
+            ["dwell"],
+            {},
+            "is of kind dwell, which has no curves to lay over others or over axes of your own; plot it alone",
+        ),
         (["backbone"], {"labels": ["a", "b"]}, "`label`: 2 for 1 files"),
         (["backbone"], {"view": View(channel="drve")}, "`channel` drve: there are force, drive, "),
         (["backbone"], {"view": View(harmonic=99)}, "`harmonic` 99: recorded are 1 to 7"),

@@ -1,0 +1,41 @@
+"""One HTML file of a figure, with its data, scripts and styles in it. Nothing in it is fetched from elsewhere."""
+
+import base64
+import hashlib
+import json
+from html import escape
+from importlib.resources import files
+from string import Template
+
+from rig.drawing.interactive.panels import contents_of
+from rig.drawing.style import Figure
+
+MARK = '<meta name="generator" content="vibrolock">'
+"""How a page says what made it."""
+
+
+def document(page: Figure) -> str:
+    """Return a figure that was laid out as an HTML document.
+
+    Its policy allows its own two scripts, by their digests, and nothing else; what stands in recordings is data, and is
+    shown as text.
+    """
+    contents = contents_of(page)
+    library, script = _file("uplot/uPlot.iife.min.js"), _file("figure.js")
+    return Template(_file("figure.html")).substitute(
+        mark=MARK,
+        title=escape(contents["title"] or "figure"),
+        digests=" ".join(f"'sha256-{_digest(text)}'" for text in (library, script)),
+        style=_file("uplot/uPlot.min.css") + _file("figure.css"),
+        contents=json.dumps(contents, ensure_ascii=True, allow_nan=False).replace("<", "\\u003c"),
+        library=library,
+        script=script,
+    )
+
+
+def _file(name: str) -> str:
+    return files(__package__).joinpath(*name.split("/")).read_text(encoding="utf-8")
+
+
+def _digest(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
