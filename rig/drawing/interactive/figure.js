@@ -49,6 +49,9 @@
     return values.map((value) => (value == null ? "" : minus(value.toFixed(digits + longer))));
   }
 
+  /** Width of an axis beside the panel, for the longest of its numbers. */
+  const widthOf = (_, texts) => Math.max(40, 14 + 7.2 * Math.max(0, ...(texts ?? []).map((text) => text.length)));
+
   /** A label "name, unit" in its parts. */
   function parts(label) {
     const at = label.lastIndexOf(", ");
@@ -143,8 +146,9 @@
       const ctx = canvas.getContext("2d");
       ctx.clearRect(0, 0, canvas.width, canvas.height);
       const at = (x, y) => [x * canvas.width, y * canvas.height];
-      const area = { rings: [[[0, 1, 1, 0], [0.2, 0.2, 0.8, 0.8]]] };
-      paint(ctx, { ...looks, x: [0.02, 0.5, 0.98], y: [0.5, 0.5, 0.5], ...area }, looks.marker ? at : at, pixel);
+      const rings = [[[0, 1, 1, 0], [0.2, 0.2, 0.8, 0.8]]];
+      paint(ctx, { ...looks, marker: undefined, x: [0.02, 0.98], y: [0.5, 0.5], rings }, at, pixel);
+      if (looks.marker) paint(ctx, { ...looks, width: undefined, x: [0.5], y: [0.5] }, at, pixel);
     };
     if (looks.marker) looks = { ...looks, size: Math.min(looks.size, 9) };
     plots.push({ redraw: draw });
@@ -234,7 +238,7 @@
       const scales = { x: this.scale(x, () => this.view.x) };
       names.forEach((name, index) => (scales[name] = this.scale(y[index], () => this.view.y[index])));
       const across = names.map((scale, index) =>
-        this.axis(y[index], { scale, size: 62, side: index ? 1 : 3, space: 34, ...(index && { grid: { show: false } }) }),
+        this.axis(y[index], { scale, size: widthOf, side: index ? 1 : 3, space: 34, ...(index && { grid: { show: false } }) }),
       );
       const options = {
         ...this.size(),
@@ -339,7 +343,7 @@
       if (best === this.hovered) return;
       this.hovered = best;
       made.redraw(false, false);
-      tell(best && this.texts(best), made.over);
+      tell(best && this.texts(best));
       if (best) placeAt(made, best, this);
     }
 
