@@ -22,9 +22,10 @@ def _engine() -> Any:
     class PageLayout(ConstrainedLayoutEngine):
         """Constrained layout that also aligns the title."""
 
-        def execute(self, fig: Figure) -> None:
-            super().execute(fig)
+        def execute(self, fig: Figure) -> Any:
+            found = super().execute(fig)
             align_title(fig)
+            return found
 
     return PageLayout
 

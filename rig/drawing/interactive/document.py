@@ -4,7 +4,7 @@ import base64
 import hashlib
 import json
 from html import escape
-from importlib.resources import files
+from pathlib import Path
 from string import Template
 
 from rig.drawing.interactive.panels import contents_of
@@ -34,7 +34,7 @@ def document(page: Figure) -> str:
 
 
 def _file(name: str) -> str:
-    return files(__package__).joinpath(*name.split("/")).read_text(encoding="utf-8")
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
 def _digest(text: str) -> str:
