@@ -8,6 +8,7 @@ KIND = ResultKind(
     table="rig.results.decay_backbone.views:TABLE",
     draw="rig.results.decay_backbone.views:draw_decay",
     figure_in=(9.0, 4.0),
+    curves={"backbones": "rig.results.decay_backbone.views:curves"},
     identification=Identification(
         "decay",
         "Frequency and damping over the amplitude, from a decay.",

@@ -1,8 +1,10 @@
 """Table and figure of a free decay: modal frequency and damping over the amplitude."""
 
+from dataclasses import replace
 from typing import Any
 
 from identification import DecayBackbone
+from rig.drawing.curves import Curves, View, backbone_curves
 from rig.drawing.style import MAIN, SECOND, Figure, engineering, title
 from rig.results.kind import Table
 from rig.text.column import Column
@@ -67,3 +69,17 @@ def draw_decay(page: Figure, found: DecayBackbone) -> None:
         left.ticklabel_format(axis="y", useOffset=False)
     count = len(found.modes)
     title(page, f"{found.specimen or 'specimen'}: free decay, {count} mode{'' if count == 1 else 's'}, 95 % intervals")
+
+
+def curves(found: DecayBackbone, view: View) -> Curves:
+    """Return modal frequency and damping over the amplitude of the drive point or, without one, of the reference."""
+    ends = [float(mode.modal_frequency_hz[-1]) for mode in found.modes]
+    drawn = backbone_curves([(None, found.nonlinear_mode(end)) for end in ends], view)
+    traces = tuple(
+        trace._replace(level=f"{end:.4g} Hz" if len(ends) > 1 else "")
+        for trace, end in zip(drawn.traces, ends, strict=True)
+    )
+    if any(channel.role == "drive" and channel.name == found.modes[0].reference for channel in found.channels):
+        return replace(drawn, traces=traces)
+    across = drawn.panels[0].x._replace(text=f"displacement amplitude of {found.modes[0].reference}")
+    return replace(drawn, traces=traces, panels=tuple(panel._replace(x=across) for panel in drawn.panels))

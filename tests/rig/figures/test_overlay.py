@@ -11,6 +11,7 @@ from rig.drawing.style import COLOURS
 from rig.errors import RecordingError
 from rig.figures.files import plot
 from rig.figures.overlay import overlay
+from rig.measurements import decays
 from rig.recording.reader import Recording
 from rig.results.files import save
 from rig.results.identify import identify_model
@@ -76,6 +77,18 @@ def test_a_model_lies_over_the_recording_that_it_was_made_of(recordings, drawn, 
     assert {"measured", "50 $ model"} <= set(texts(page))
     with refused(RecordingError, "model-channel-acc-magnet-the-file"):
         overlay([path, tmp_path / "model.h5"], view=View(channel="acc_magnet"))
+
+
+def test_a_decay_lies_over_a_backbone_as_a_line(recordings, drawn, tmp_path):
+    with Recording(recordings["decay"]) as recording:
+        (found,) = decays(recording)
+    save(found, tmp_path / "decay.h5")
+    frequency, damping = drawn(overlay([recordings["backbone"], tmp_path / "decay.h5"])).axes
+    mode = found.mode()
+    for axis, values in ((frequency, mode.modal_frequency_hz), (damping, 100.0 * mode.damping_ratio)):
+        (line,) = [one for one in axis.get_lines() if one.get_linestyle() == "-"]
+        order = np.argsort(mode.amplitude_m)
+        np.testing.assert_allclose(line.get_xydata().T, [1e3 * mode.amplitude_m[order], values[order]], rtol=1e-9)
 
 
 def test_responses_from_elsewhere_lie_over_a_stepped_sine(recordings, drawn, tmp_path):
