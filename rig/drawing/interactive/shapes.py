@@ -1,6 +1,7 @@
 """Lines, points, error bars and areas of matplotlib's axes as numbers that a page in a browser draws."""
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ PIXELS = 96.0 / 72.0
 """Of a page, in a point."""
 DIGITS = 7
 """Significant digits of coordinates."""
+MOST = 4000
+"""Largest number of points of a line; of more, the least and the greatest of neighbours remain."""
 _CAPS = ("|", "_")
 
 
@@ -63,6 +66,22 @@ def numbers(values: Any) -> list[float | None]:
     return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in np.asarray(values, float)]
 
 
+def thinned(x: Float, y: Float) -> tuple[Float, Float]:
+    """Return a line with `MOST` points at most: of neighbours the one with the least and the one with the greatest ``y``."""
+    if x.size <= MOST:
+        return x, y
+    ends = np.linspace(0, x.size, MOST // 2 + 1).astype(int)
+    kept = []
+    for first, end in pairwise(ends):
+        some = y[first:end]
+        if np.isfinite(some).all():
+            kept += [first + int(np.argmin(some)), first + int(np.argmax(some))]
+        else:  # a gap stays one
+            kept += [first, first + int(np.flatnonzero(~np.isfinite(some))[0])]
+    at = np.unique(kept)
+    return x[at], y[at]
+
+
 def _halves(axis: Axes) -> Iterator[tuple[Artist, Float]]:
     """Yield lines with error bars along y, and half of the bar of each point."""
     from matplotlib.container import ErrorbarContainer
@@ -110,6 +129,7 @@ def _line(line: Any, half: Float | None) -> Shape:
     x, y = (np.asarray(values, float) for values in (line.get_xdata(orig=False), line.get_ydata(orig=False)))
     if line.get_drawstyle() != "default":
         x, y = STEP_LOOKUP_MAP[line.get_drawstyle()](x, y)
+    x, y = thinned(x, y)
     notes = getattr(line, "vibrolock_notes", ())
     found = {"kind": "line", **_looks_of_line(line), "x": numbers(x), "y": numbers(y)}
     if half is not None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.drawing.interactive.shapes import MOST, thinned
 from rig.drawing.page import page_for
 from rig.drawing.style import title
 from rig.errors import RecordingError
@@ -135,6 +136,20 @@ def test_looks_are_those_of_the_printed_figure(drawn):
     assert panel["x"]["limits"] == [3.0, 0.0]
     assert panel["y"][0]["label"] == "shape, kg⁻¹ᐟ²"
     assert panel["legend"][0]["looks"]["dash"] == dotted["dash"]
+
+
+def test_long_lines_keep_their_extremes_and_gaps():
+    x = np.arange(100_001.0)
+    y = np.sin(1e-4 * x)
+    y[[12_345, 67_890]] = 5.0, -5.0
+    y[50_000] = np.nan
+    few, values = thinned(x, y)
+    assert few.size <= MOST
+    assert {5.0, -5.0} <= set(values)
+    assert np.isnan(values).any()
+    good = np.isfinite(values) & (np.abs(values) < 2.0)
+    np.testing.assert_allclose(values[good], np.sin(1e-4 * few[good]), rtol=1e-12)
+    assert np.diff(few).max() < 200.0
 
 
 def test_panels_that_share_an_axis_are_zoomed_together_and_are_labelled(drawn):
