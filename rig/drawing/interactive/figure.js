@@ -4,7 +4,7 @@
   const contents = JSON.parse(document.getElementById("contents").textContent);
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const NEAR = 28; // pixels from a point within which it is told
-  const LEAST_CONTRAST = 3; // of curves against the ground
+  const LEAST_CONTRAST = 4.5; // of curves against the ground
   const plots = [];
   let ink = {};
 

@@ -83,7 +83,6 @@ def test_a_backbone_has_the_values_intervals_and_quality_of_its_points(recording
         for note, point in zip(line["notes"], points, strict=True):
             assert note.startswith(f"point {point['number'] + 1}: {point['quality']}")
             assert all(warning.partition(":")[0] in note for warning in point["warnings"])
-    assert any("warned" in note for note in lines(frequency)[0]["notes"])
     assert [y["label"] for y in history["y"]] == ["oscillator frequency, Hz", "output amplitude, V"]
     assert {shape["on"] for shape in history["shapes"]} == {0, 1}
     assert [entry["text"] for entry in error["legend"]] == ["detector", "recorded points", "ramp-down"]

@@ -70,7 +70,7 @@ def test_a_model_lies_over_the_recording_that_it_was_made_of(recordings, drawn, 
     page = drawn(overlay([path, tmp_path / "model.h5"], ["measured", "50 $ model"]))
     (measured,) = (line for line in page.axes[0].get_lines() if line.get_marker() == "o")
     (model,) = (line for line in page.axes[0].get_lines() if line.get_linestyle() == "-")
-    assert (measured.get_linestyle(), model.get_marker()) == ("None", "None")
+    assert (measured.get_linestyle(), model.get_marker()) == ("None", "")
     np.testing.assert_allclose(model.get_xydata(), measured.get_xydata(), rtol=1e-6)
     bands = [band for band in page.axes[0].collections if band.get_alpha() == 0.2]
     assert len(bands) == 1
@@ -81,7 +81,7 @@ def test_a_model_lies_over_the_recording_that_it_was_made_of(recordings, drawn, 
 
 def test_a_decay_lies_over_a_backbone_as_a_line(recordings, drawn, tmp_path):
     with Recording(recordings["decay"]) as recording:
-        (found,) = decays(recording)
+        (found,) = decays(recording).values()
     save(found, tmp_path / "decay.h5")
     frequency, damping = drawn(overlay([recordings["backbone"], tmp_path / "decay.h5"])).axes
     mode = found.mode()

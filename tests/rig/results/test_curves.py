@@ -25,8 +25,9 @@ def files(shelf):
     save(replace(steady, steady=shifted), shelf / "other.h5")
     swept = predict_vibrations(shelf / "NM.h5", {"sweeps": (shelf / "sweep.h5",)})
     save(swept, shelf / "swept.h5")
-    both = replace(swept, steady=steady.steady, steady_references=(None,) * len(steady.steady))
-    save(replace(both, steady_errors=both.steady_references, steady_bands=()), shelf / "both.h5")
+    none = (None,) * len(steady.steady)
+    both = replace(swept, steady=steady.steady, steady_references=none, steady_errors=none, steady_bands=none)
+    save(both, shelf / "both.h5")
     return shelf
 
 
