@@ -86,6 +86,7 @@ def _halves(axis: Axes) -> Iterator[tuple[Artist, Float]]:
     """Yield lines with error bars along y, and half of the bar of each point."""
     from matplotlib.container import ErrorbarContainer
 
+    container: Any
     for container in axis.containers:
         if isinstance(container, ErrorbarContainer) and container.has_yerr and container[0] is not None:
             segments = container[2][-1].get_segments()

@@ -15,6 +15,9 @@ from rig.figures.overlay import overlay
 from rig.results.files import load, save
 from rig.results.predict import predict_vibrations
 
+MICRO = 1e6
+"""Micrometres in a metre: amplitudes of the shelf are below half a millimetre."""
+
 
 @pytest.fixture(scope="module")
 def files(shelf):
@@ -60,7 +63,7 @@ def test_predictions_are_lines_over_recordings_as_markers(files):
     size, phase = page.axes
     for colour, name in zip(COLOURS, ("steady.h5", "other.h5"), strict=False):
         found = load(files / name).steady
-        for axis, values in ((size, [1e3 * one.amplitude_m() for one in found]), (phase, None)):
+        for axis, values in ((size, [MICRO * one.amplitude_m() for one in found]), (phase, None)):
             values = values or [(one.phase_lag_deg() + 90.0) % 360.0 - 90.0 for one in found]
             every = np.transpose([np.concatenate([one.frequency_hz for one in found]), np.concatenate(values)])
             np.testing.assert_allclose(joined(axis, colour), np.unique(every.round(12), axis=0), rtol=1e-9)
@@ -82,7 +85,7 @@ def test_a_prediction_shows_its_reference_where_no_recording_does(files):
     page = drawn(files / "steady.h5", files / "other.h5")
     (mark,) = lines(page.axes[0], markers=True)  # once, though both files hold it
     (reference,) = [one for one in load(files / "steady.h5").steady_references if one is not None]
-    np.testing.assert_allclose(mark.get_xydata().T, [reference.frequency_hz, 1e3 * reference.amplitude_m], rtol=1e-9)
+    np.testing.assert_allclose(mark.get_xydata().T, [reference.frequency_hz, MICRO * reference.amplitude_m], rtol=1e-9)
     assert "measured" in legend(page)
     assert not lines(drawn(files / "steady.h5", view=View(channel="drive")).axes[0], markers=True)
 
@@ -90,16 +93,18 @@ def test_a_prediction_shows_its_reference_where_no_recording_does(files):
 def test_a_predicted_sweep_lies_over_the_recorded_one(files):
     size, force = drawn(files / "swept.h5", files / "sweep.h5").axes
     predictions = load(files / "swept.h5")
-    (sweep,), (recorded,) = predictions.sweeps, predictions.sweep_references
-    expected = as_recorded(sweep, recorded)[1:]
-    for axis, values in ((size, expected[0]), (force, expected[1])):
-        (line,) = [one for one in axis.get_lines() if to_rgba(one.get_color()) == to_rgba(COLOURS[0])]
-        scale = np.nanmax(line.get_ydata()) / values.max()
-        assert any(scale == pytest.approx(unit) for unit in (1.0, 1e3, 1e6))
-        np.testing.assert_allclose(line.get_ydata(), scale * values, rtol=1e-9)
-        (behind,) = [one for one in axis.get_lines() if to_rgba(one.get_color()) == to_rgba(COLOURS[1])]
-        assert behind.get_linewidth() > 2.0 * line.get_linewidth()
-        assert behind.get_zorder() < line.get_zorder()
+    pairs = zip(predictions.sweeps, predictions.sweep_references, strict=True)
+    expected = [as_recorded(sweep, recorded)[1:] for sweep, recorded in pairs]
+    for n, axis in enumerate((size, force)):
+        shown = [one for one in axis.get_lines() if to_rgba(one.get_color()) == to_rgba(COLOURS[0])]
+        behind = [one for one in axis.get_lines() if to_rgba(one.get_color()) == to_rgba(COLOURS[1])]
+        assert len(shown) == len(behind) == len(expected)
+        for line, pale, values in zip(shown, behind, expected, strict=True):
+            scale = np.nanmax(line.get_ydata()) / values[n].max()
+            assert any(scale == pytest.approx(unit) for unit in (1.0, 1e3, 1e6))
+            np.testing.assert_allclose(line.get_ydata(), scale * values[n], rtol=1e-9)
+            assert pale.get_linewidth() > 2.0 * line.get_linewidth()
+            assert pale.get_zorder() < line.get_zorder()
 
 
 def test_linear_modes_lie_over_their_multisine(files):
@@ -116,7 +121,9 @@ def test_files_with_two_families_take_the_one_they_share(files):
     assert drawn(files / "both.h5", files / "sweep.h5").axes[1].get_ylabel() == "fundamental force, N"
     page = drawn(files / "both.h5", files / "stepped.h5")
     assert page.axes[1].get_ylabel() == "phase lag of displacement, deg"
-    assert "not drawn of both: 1 predicted sweep" in page.get_suptitle().replace("\n", " ")
+    assert f"not drawn of both: {len(load(files / 'both.h5').sweeps)} predicted sweeps" in page.get_suptitle().replace(
+        "\n", " "
+    )
 
 
 @pytest.mark.parametrize(
