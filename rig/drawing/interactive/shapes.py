@@ -105,12 +105,9 @@ def _shapes(axis: Axes, artist: Any, halves: Mapping[int, Float]) -> Iterator[Sh
     if isinstance(artist, Line2D):
         yield {**_line(artist, halves.get(id(artist))), **along}
     elif isinstance(artist, LineCollection):
-        ends = np.array([one for one in artist.get_segments() if len(one) == 2]).reshape(-1, 4)
-        looks = {"colour": colour_of(artist.get_color()[0]), "width": PIXELS * float(artist.get_linewidth()[0])}
-        yield {"kind": "bars", **looks, **along, "ends": [numbers(end) for end in ends.T]}
+        yield {**_bars(artist), **along}
     elif isinstance(artist, PolyCollection):
-        rings = [path.vertices for path in artist.get_paths() if len(path.vertices)]
-        yield {"kind": "area", "colour": colour_of(artist.get_facecolor()[0]), **along, "rings": _rings(rings)}
+        yield {**_areas(artist), **along}
     elif isinstance(artist, Patch):
         rings = artist.get_path().transformed(artist.get_patch_transform()).to_polygons(closed_only=False)
         in_data = artist.get_data_transform().contains_branch_seperately(axis.transData)
@@ -118,6 +115,17 @@ def _shapes(axis: Axes, artist: Any, halves: Mapping[int, Float]) -> Iterator[Sh
         yield {"kind": "area", "colour": colour_of(artist.get_facecolor()), **along, "rings": _rings(rings)}
     else:
         raise NoShapeError
+
+
+def _bars(artist: Any) -> Shape:
+    ends = np.array([one for one in artist.get_segments() if len(one) == 2]).reshape(-1, 4)
+    looks = {"colour": colour_of(artist.get_color()[0]), "width": PIXELS * float(artist.get_linewidth()[0])}
+    return {"kind": "bars", **looks, "ends": [numbers(end) for end in ends.T]}
+
+
+def _areas(artist: Any) -> Shape:
+    rings = [path.vertices for path in artist.get_paths() if len(path.vertices)]
+    return {"kind": "area", "colour": colour_of(artist.get_facecolor()[0]), "rings": _rings(rings)}
 
 
 def _rings(rings: Any) -> list[list[list[float | None]]]:
