@@ -22,7 +22,7 @@ class Look:
 
     colour: Any
     marker: str
-    line: str
+    line: str | tuple[int, tuple[float, float]]
     size: float = 1.0
     """Of its markers, over the usual size: earlier files have larger ones, which later ones do not hide."""
     hollow: bool = False

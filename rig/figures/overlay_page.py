@@ -86,7 +86,7 @@ def _line(axis: Axes, line: Line, look: Look, trace: Trace, name: str) -> None:
     folded = line.folded is not None and bool(line.folded.any())
     style = look.style()
     if trace.origin == "model":
-        _model_line(axis, line, style, known, name)
+        _model_line(axis, line, style, name)
         return
     drawn = axis.errorbar(line.x, line.y, line.half_95, **style)[0] if known else axis.plot(line.x, line.y, **style)[0]
     note_points(drawn, trace.notes, name)
@@ -95,9 +95,9 @@ def _line(axis: Axes, line: Line, look: Look, trace: Trace, name: str) -> None:
         axis.plot(line.x[line.folded], line.y[line.folded], **style)
 
 
-def _model_line(axis: Axes, line: Line, style: dict[str, Any], known: bool, name: str) -> None:
+def _model_line(axis: Axes, line: Line, style: dict[str, Any], name: str) -> None:
     """Draw a line with a pale band of its 95 % interval; unstable parts are dotted."""
-    if known:
+    if line.half_95 is not None and np.isfinite(line.half_95).any():
         half = np.nan_to_num(line.half_95)
         axis.fill_between(line.x, line.y - half, line.y + half, color=style["color"], alpha=0.2, lw=0)
     unstable = np.zeros(line.x.size, bool) if line.folded is None else line.folded

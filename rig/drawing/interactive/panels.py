@@ -105,7 +105,11 @@ def _texts(axis: Axes) -> Iterator[dict[str, Any]]:
         if text.get_text() and text.get_visible():
             yield {
                 **{"x": float(x), "y": float(y), "inX": bool(in_data[0]), "inY": bool(in_data[1])},
-                **{"text": _plain(text.get_text()), "across": text.get_ha(), "up": text.get_va()},
+                **{
+                    "text": _plain(text.get_text()),
+                    "across": text.get_horizontalalignment(),
+                    "up": text.get_verticalalignment(),
+                },
                 "colour": colour_of(text.get_color()),
             }
 
