@@ -49,13 +49,13 @@ def stuck_after(t: TickArrays) -> int:
     At the turning points of a vibration of A steps of the converter, ``sqrt(2 / A) / pi`` of a period read the same. Leaving
     these readings out would be a drift of the displacement.
     """
-    return max(STUCK_SAMPLES, round(STUCK_PERIODS * TWO_PI / (dominant_omega(t) * t.loop[0].dt_s)))
+    return max(STUCK_SAMPLES, int(STUCK_PERIODS * TWO_PI / (dominant_omega(t) * float(t.loop[0].dt_s))))
 
 
 @kernel
 def uncertain_samples(t: TickArrays) -> int:
     """Return for how many samples the displacement is corrected after a loss."""
-    return round(UNCERTAIN_PERIODS * TWO_PI / (dominant_omega(t) * t.loop[0].dt_s))
+    return round(UNCERTAIN_PERIODS * TWO_PI / (dominant_omega(t) * float(t.loop[0].dt_s)))
 
 
 @kernel
