@@ -14,7 +14,7 @@ from vibrolock.compiled import kernel
 STUCK_SAMPLES = 16
 """Least number of equal readings in a row after which a channel's motion is no longer integrated; see `stuck_after`."""
 STUCK_PERIODS = 0.25
-"""Periods of equal readings after which it is not; chosen: the displacement is then at most 2.2 times the true one."""
+"""Periods of equal readings after which it is not; chosen: the displacement is then at most 2.3 times the true one."""
 
 UNCERTAIN_PERIODS = 1.5
 """Periods after a loss, or after equal readings, in which the displacement is corrected; chosen: a difference has then fallen

@@ -25,7 +25,8 @@ from rig.results.kinds import KINDS
 from rig.text.durations import duration
 
 START_S = 10.0  # s until the processes of a rehearsal are at work; measured on two cores
-TIMES_REAL_TIME = 60.0  # speed of one process with the evaluation of its points; measured with the shipped backbones
+SLOW, FAST = 25.0, 70.0
+"""Times real time of one process with the evaluation of its points: of the magnet beam's backbone on two machines."""
 FURTHER_SEED = 1
 """Added to the seed of a rehearsal for that of the improved plan, which was chosen by the first one's twins."""
 
@@ -85,9 +86,9 @@ def request_for(subject: Subject) -> RehearsalRequest:
 def expected_duration(request: RehearsalRequest, jobs: int | None) -> str:
     """Return how long a rehearsal will take, in words, on so many processes (-1: one a core)."""
     twin_s = dry_run(request.plan, request.bench, Path("rehearsal.h5")).least.duration_s
-    processes = os.cpu_count() or 1 if jobs is None or jobs < 1 else jobs
-    wanted_s = START_S + request.draws * twin_s / (TIMES_REAL_TIME * min(processes, request.draws))
-    return f"some {duration(wanted_s)}: each runs {duration(twin_s)} at about {TIMES_REAL_TIME:g} times real time"
+    processes = min(os.cpu_count() or 1 if jobs is None or jobs < 1 else jobs, request.draws)
+    quick, slow = (duration(START_S + request.draws * twin_s / (speed * processes)) for speed in (FAST, SLOW))
+    return f"some {quick} to {slow}: each runs {duration(twin_s)} at {SLOW:g} to {FAST:g} times real time"
 
 
 @contextmanager

@@ -143,7 +143,8 @@ def _say(summary: dict[str, Any]) -> None:
         value = f"{number(summary['support_n_m'], '.4g')} N/m" if known else "not identified"
         print(f"unseen support at the drive point: {value}")
     if unknown := [name for name in summary["not_identified"] if name != "support"]:
-        print(f"not identified, at a bound of the fit or with an interval that reaches 0: {', '.join(unknown)} (mode)")
+        named = ", ".join(name.replace(" ", " of mode ") for name in unknown)
+        print(f"not identified (at a bound of the fit, or with an interval that reaches 0): {named}")
     say_scatter(summary["scatter"])
     say_errors(summary)
 
