@@ -27,6 +27,9 @@ def _engine() -> Any:
             align_title(fig)
             return found
 
+        def __reduce__(self) -> tuple[Any, ...]:
+            return page_layout, (), self.__dict__  # a figure can be pickled
+
     return PageLayout
 
 
