@@ -43,7 +43,7 @@ def test_the_beside_sensor_reads_more_than_the_drive_point_by_the_documented_rat
 
 
 def test_the_coupled_plant_has_another_mode_than_the_structure() -> None:
-    plant = TimeDomain(ONE_SIDED.without_friction(), 0.0, 1.0)
+    plant = TimeDomain(ONE_SIDED.without_friction(), 0.0, 1.0).equations
     linear = plant.linear + np.outer(plant.into[:, 0], plant.z_row) * float(ONE_SIDED.magnet_slope(np.zeros(1))[0])
     poles = np.linalg.eigvals(linear)
     first = min(poles[poles.imag > 1.0], key=abs)

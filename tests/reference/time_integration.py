@@ -6,14 +6,81 @@ per step.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from numba import njit
+from scipy.integrate import ode
 
 from tests.reference.coupled_rig import CoupledRig
 from vibrolock.arrays import Complex, Float
 
 Derivative = Callable[[float, Float], Float]
+
+
+class Equations(NamedTuple):
+    """What the right-hand side is made of."""
+
+    linear: Float
+    into: Float
+    """Where magnet, friction and voltage enter, shape (size, 3)."""
+    z_row: Float
+    delta_row: Float
+    voltages_v: Complex
+    omega: float
+    ramp_s: float
+    magnet_k0: float
+    magnet_d0_m: float
+    symmetric: float
+    stuck: float
+
+
+@njit(cache=True)
+def rates(t, x, jenkins, equations):
+    """x' under the given sum of Jenkins forces."""
+    linear, into, z_row, delta_row, voltages_v, omega, ramp_s, k0, d0, symmetric, stuck = equations
+    rise = 1.0 if t >= ramp_s else 0.5 - 0.5 * np.cos(np.pi * t / ramp_s)
+    voltage = 0.0
+    for order in range(voltages_v.size):
+        voltage += (voltages_v[order] * np.exp(1j * order * omega * t)).real
+    z, delta = 0.0, 0.0
+    for i in range(x.size):
+        z += z_row[i] * x[i]
+        delta += delta_row[i] * x[i]
+    magnet = k0 * ((d0 + symmetric * z) ** -4 - (d0 - z) ** -4)
+    friction = stuck * delta - jenkins
+    out = np.empty(x.size)
+    for i in range(x.size):
+        out[i] = into[i, 0] * magnet + into[i, 1] * friction + into[i, 2] * rise * voltage
+        for j in range(x.size):
+            out[i] += linear[i, j] * x[j]
+    return out
+
+
+@njit(cache=True)
+def moved(force, k, limit, delta_row, way):
+    """Jenkins forces after a further way of the rig."""
+    return np.minimum(np.maximum(force + k * np.sum(delta_row * way), -limit), limit)
+
+
+@njit(cache=True)
+def runge_kutta_with_return_map(kept, periods, h, k, limit, equations):
+    """Fill ``kept`` with the states of the last period."""
+    steps, delta_row = kept.shape[0], equations.delta_row
+    x, force = np.zeros(kept.shape[1]), np.zeros(k.size)
+    for step in range(periods * steps):
+        kept[step % steps] = x
+        t = step * h
+        first = rates(t, x, force.sum(), equations)
+        way = h / 2 * first
+        second = rates(t + h / 2, x + way, moved(force, k, limit, delta_row, way).sum(), equations)
+        way = h / 2 * second
+        third = rates(t + h / 2, x + way, moved(force, k, limit, delta_row, way).sum(), equations)
+        way = h * third
+        last = rates(t + h, x + way, moved(force, k, limit, delta_row, way).sum(), equations)
+        way = h / 6 * (first + 2 * second + 2 * third + last)
+        force = moved(force, k, limit, delta_row, way)
+        x = x + way
 
 
 class TimeDomain:
@@ -25,39 +92,39 @@ class TimeDomain:
     def __init__(
         self, rig: CoupledRig, voltage_v: float | Complex, omega_rad_s: float, ramp_periods: float = 20.0
     ) -> None:
-        self.rig, self.omega = rig, omega_rad_s
-        self.voltages_v = np.array([0.0, voltage_v]) if np.ndim(voltage_v) == 0 else np.asarray(voltage_v)
-        self.orders = np.arange(self.voltages_v.size)
+        self.rig = rig
         self.period_s = 2.0 * np.pi / omega_rad_s
-        self.ramp_s = ramp_periods * self.period_s
         mass, damping, stiffness = rig.second_order
         n = rig.w_rad_s.size + 1
         inverse = 1.0 / np.diag(mass)
         self.mechanical, self.size = n, 2 * n + 1
-        self.linear = np.zeros((self.size, self.size))
-        self.linear[:n, n : 2 * n] = np.eye(n)
-        self.linear[n:, :n] = -inverse[:, None] * stiffness[:, :n]
-        self.linear[n:, n:] = -inverse[:, None] * damping
-        self.into = np.zeros((self.size, 3))
-        self.into[n:] = inverse[:, None] * rig.inputs
+        linear, into = np.zeros((self.size, self.size)), np.zeros((self.size, 3))
+        linear[:n, n : 2 * n] = np.eye(n)
+        linear[n:, :n] = -inverse[:, None] * stiffness[:, :n]
+        linear[n:, n:] = -inverse[:, None] * damping
+        into[n:] = inverse[:, None] * rig.inputs
         pad = np.zeros(self.size - n + 1)
-        self.z_row = np.r_[rig.phi_magnet, pad]
         self.delta_row = np.r_[rig.jenkins_c, pad]
         self.drive_row = np.r_[rig.phi_drive, pad]
         self.stuck = float(rig.jenkins_k.sum())
         self.limit = rig.jenkins_k * rig.jenkins_slip
+        self.equations = Equations(
+            linear=linear,
+            into=into,
+            z_row=np.r_[rig.phi_magnet, pad],
+            delta_row=self.delta_row,
+            voltages_v=np.array([0.0, voltage_v] if np.ndim(voltage_v) == 0 else voltage_v, np.complex128),
+            omega=float(omega_rad_s),
+            ramp_s=float(ramp_periods * self.period_s),
+            magnet_k0=float(rig.magnet_k0),
+            magnet_d0_m=float(rig.magnet_d0_m),
+            symmetric=float(rig.symmetric),
+            stuck=self.stuck,
+        )
 
-    def voltage(self, t: float) -> float:
-        rise = 1.0 if t >= self.ramp_s else 0.5 - 0.5 * np.cos(np.pi * t / self.ramp_s)
-        return float(rise * np.real(self.voltages_v @ np.exp(1j * self.omega * t * self.orders)))
-
-    def derivative(self, t: float, x: Float, jenkins: float = 0.0) -> Float:
-        """x' under the given sum of Jenkins forces."""
-        z, rig = float(self.z_row @ x), self.rig
-        away = (rig.magnet_d0_m + z) if rig.symmetric else rig.magnet_d0_m
-        magnet = rig.magnet_k0 * (away**-4 - (rig.magnet_d0_m - z) ** -4)
-        friction = self.stuck * float(self.delta_row @ x) - jenkins
-        return np.asarray(self.linear @ x + self.into @ np.array([magnet, friction, self.voltage(t)]))
+    def derivative(self, t: float, x: Float) -> Float:
+        """x' where nothing rubs."""
+        return np.asarray(rates(t, x, 0.0, self.equations))
 
     def derivative_with_rates(self, t: float, y: Float) -> Float:
         """State and Jenkins forces: f_j' = k_j delta', held at the limit while the motion pushes on."""
@@ -65,7 +132,7 @@ class TimeDomain:
         speed = float(self.delta_row[: self.mechanical] @ x[self.mechanical : 2 * self.mechanical])
         pushing = f * np.sign(speed) >= self.limit
         return np.concatenate(
-            [self.derivative(t, x, float(f.sum())), np.where(pushing, 0.0, self.rig.jenkins_k * speed)]
+            [rates(t, x, f.sum(), self.equations), np.where(pushing, 0.0, self.rig.jenkins_k * speed)]
         )
 
     def force_n(self, x: Float) -> Float:
@@ -77,11 +144,12 @@ class TimeDomain:
 
     def last_period(self, derivative: Derivative, extra: int, periods: int, samples: int = 128) -> Float:
         """DOP853 from rest over whole periods; states of the last one, shape (samples, size)."""
+        solver = ode(derivative).set_integrator("dop853", rtol=1e-8, atol=1e-11, nsteps=10**7)
+        solver.set_initial_value(np.zeros(self.size + extra), 0.0)
         t = (periods - 1 + np.arange(samples) / samples) * self.period_s
-        solution = solve_ivp(
-            derivative, (0.0, float(t[-1])), np.zeros(self.size + extra), "DOP853", t, rtol=1e-8, atol=1e-11
-        )
-        return np.asarray(solution.y[: self.size].T)
+        states = np.array([solver.integrate(one) for one in t])
+        assert solver.successful()
+        return states[:, : self.size]
 
     def without_friction(self, periods: int) -> Float:
         """Settled period, clamp stuck (the rig must have no Jenkins stiffness), shape (samples, size)."""
@@ -94,26 +162,9 @@ class TimeDomain:
 
     def with_return_map(self, periods: int, steps: int = 384) -> Float:
         """Settled period by classical Runge-Kutta steps and the return map, shape (steps, size)."""
-        h, k = self.period_s / steps, self.rig.jenkins_k
-        x, force, kept = np.zeros(self.size), np.zeros(k.size), np.zeros((steps, self.size))
-
-        def moved(to: Float) -> Float:
-            trial = force + k * float(self.delta_row @ (to - x))
-            return np.minimum(np.maximum(trial, -self.limit), self.limit)
-
-        def slope(t: float, at: Float) -> Float:
-            return self.derivative(t, at, float(moved(at).sum()))
-
-        for step in range(periods * steps):
-            kept[step % steps] = x
-            t = step * h
-            first = slope(t, x)
-            second = slope(t + h / 2, x + h / 2 * first)
-            third = slope(t + h / 2, x + h / 2 * second)
-            last = slope(t + h, x + h * third)
-            after = x + h / 6 * (first + 2 * second + 2 * third + last)
-            force = moved(after)
-            x = after
+        kept = np.zeros((steps, self.size))
+        h = self.period_s / steps
+        runge_kutta_with_return_map(kept, periods, h, self.rig.jenkins_k, self.limit, self.equations)
         return kept
 
     def harmonics(self, signal: Float) -> Complex:
