@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from numba import njit
 from scipy.integrate import solve_ivp
 
 from identification import IdentificationError
@@ -67,24 +68,53 @@ def smooth(**changes):
     return beam(elements=(replace(first, laws=first.laws[:2]), replace(second, laws=second.laws[:1])), **changes)
 
 
-def continuous(model, u, times):
+@njit(cache=True)
+def polynomial(coefficients, x):
+    """Value of a polynomial, that of the lowest power first."""
+    value = 0.0
+    for one in coefficients[::-1]:
+        value = value * x + one
+    return value
+
+
+@njit(cache=True)
+def rates(t, x, step_s, u, numbers):
     """Right-hand side of the equation of motion, written anew, with the support's filter."""
-    omega, zeta, b = model.omega, model.damping_ratio, model.input_shapes[:, 0]
+    omega, zeta, b, directions, scales, springs, dampers, (stiffness, largest, corner) = numbers
+    q, v = x[:2], x[2:4]
+    at = min(int(t / step_s), u.size - 2)
+    force = u[at] + (u[at + 1] - u[at]) * (t / step_s - at) - largest * np.tanh(stiffness * x[5] / largest)
+    out = np.zeros(6)
+    out[:2] = v
+    out[2:4] = b * force - 2.0 * zeta * omega * v - omega**2 * q
+    for e in range(scales.size):
+        z, rate = np.sum(directions[e] * q), np.sum(directions[e] * v)
+        of_laws = polynomial(springs[e], z / scales[e]) + polynomial(dampers[e], abs(z / scales[e])) * rate
+        out[2:4] -= directions[e] * of_laws
+    out[4:] = 2.0 * np.pi * corner * np.array([np.sum(b * q) - x[4], x[4] - x[5]])
+    return out
 
-    def rates(t, x):
-        q, v = x[:2], x[2:4]
-        force = np.interp(t, times, u)
-        force -= model.support_largest_n * np.tanh(model.support_n_m * x[5] / model.support_largest_n)
-        a = b * force - 2.0 * zeta * omega * v - omega**2 * q
-        for e, element in enumerate(model.elements):
-            z, rate = element.direction @ q, element.direction @ v
-            force = element.laws[0].force(z / element.scale_m)
-            if e == 0:
-                force = force + element.laws[1].damping(z / element.scale_m) * rate
-            a -= element.direction * force
-        return np.concatenate([v, a, 2.0 * np.pi * model.support_corner_hz * np.array([b @ q - x[4], x[4] - x[5]])])
 
-    return rates
+def numbers_of(model):
+    """What `rates` are made of: a spring in both elements, a damper in the first."""
+    first, second = (element.laws for element in model.elements)
+    springs, dampers = np.zeros((2, 6)), np.zeros((2, 3))
+    for row, law in zip(springs, (first[0], second[0]), strict=True):
+        row[2 : 2 + len(law.coefficients_n)] = law.coefficients_n
+    dampers[0, 1:] = first[1].coefficients_n_s_m
+    directions = np.array([element.direction for element in model.elements])
+    scales = np.array([element.scale_m for element in model.elements])
+    support = float(model.support_n_m), float(model.support_largest_n), float(model.support_corner_hz)
+    return (
+        model.omega,
+        model.damping_ratio,
+        model.input_shapes[:, 0].copy(),
+        directions,
+        scales,
+        springs,
+        dampers,
+        support,
+    )
 
 
 def test_the_run_tends_to_the_solution_of_the_equation_with_the_square_of_the_step():
@@ -96,14 +126,15 @@ def test_the_run_tends_to_the_solution_of_the_equation_with_the_square_of_the_st
         times = np.arange(ends.size) / (RATE_HZ * steps)
         # steps no longer than the kinks of the linearly interpolated force are apart
         found = solve_ivp(
-            continuous(model, ends, times),
+            rates,
             (0.0, times[-1]),
             np.zeros(6),
             method="DOP853",
             t_eval=times[:-1:steps],
             rtol=1e-9,
             atol=1e-14,
-            max_step=1.0 / (RATE_HZ * steps),
+            max_step=times[1],
+            args=(times[1], ends, numbers_of(model)),
         )
         run_of = model.simulate(u)
         difference = run_of.displacement - found.y[:2]
@@ -262,9 +293,10 @@ def test_no_force_of_a_hundred_times_the_range_makes_a_run_unbounded(seed):
     integral = np.cumsum(held**2)[:: model.steps] / (RATE_HZ * model.steps)
     bound = np.sum(model.input_shapes[:, 0] ** 2) / (4.0 * slowest) * integral
     states = np.vstack([found.displacement, found.velocity, np.zeros((2, samples))]).T
-    energies = np.array([energy(model.system, state) for state in states])
+    at = slice(1, None, 7)  # no divisor of a period
+    energies = np.array([energy(model.system, state) for state in states[at]])
     assert np.max(found.reach_use) > 3.0
-    assert np.all(energies[1:] <= bound[1:] + 1e-9)
+    assert np.all(energies <= bound[at] + 1e-9)
 
 
 @pytest.mark.parametrize(
