@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 
 FIRMWARE = Path(__file__).parents[2]
@@ -36,8 +37,9 @@ def core() -> list[str]:
     return sorted(f"core/{path.name}" for path in (FIRMWARE / "core").glob("*.c"))
 
 
+@cache
 def objects(build: Path, optimisation: str) -> list[str]:
-    """The core's sources compiled one by one, with a call graph (.ci) beside each object."""
+    """The core's sources compiled one by one, once in a process, with a call graph (.ci) beside each object."""
     folder = build / f"core{optimisation}"
     folder.mkdir(parents=True, exist_ok=True)
     out = [str(folder / f"{Path(source).stem}.o") for source in core()]
@@ -46,8 +48,9 @@ def objects(build: Path, optimisation: str) -> list[str]:
     return out
 
 
+@cache
 def load(build: Path, wire: str, optimisation: str, block: int = 10) -> Path:
-    """The core with a host of its own (load.c), linked for a wire."""
+    """The core with a host of its own (load.c), linked for a wire, once in a process."""
     host = "serial_host.c" if wire == "serial" else "can_host.c"
     sources = [f"{BOARD}/startup.c", *(f"checks/arm/{name}" for name in ("load.c", "common.c", host))]
     out = build / f"load-{WIRES[wire]}{optimisation}-{block}.elf"
