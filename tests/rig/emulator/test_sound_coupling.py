@@ -1,5 +1,7 @@
 """High-passes of an emulated sound card, a calibration through its cables, and a phase-locked test with what it has found."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,17 @@ from tests.rig.emulator.calibrating import (
 )
 from tests.rig.emulator.sound_without_clock import PERIODS, Behind, sound_card
 from tests.rig.rigs import bench_with
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    """What a calibration through these high-passes finds, and the bench that it writes: made once."""
+
+    def made(corners_hz):
+        with pytest.MonkeyPatch.context() as patch, sound_card(patch, bench_with(), corners_hz, cables=True) as bench:
+            return calibrated(bench, tmp_path_factory.mktemp("card"))
+
+    return cache(made)
 
 
 @pytest.mark.parametrize("corners_hz", [(), (5.0,), CORNERS_HZ])
@@ -59,13 +72,13 @@ def test_a_wire_has_neither_cables_nor_high_passes():
 
 
 @pytest.mark.parametrize("corners_hz", [(2.0,), (10.0,), CORNERS_HZ])
-def test_phases_between_channels_are_right_after_a_calibration(monkeypatch, tmp_path, corners_hz):
+def test_phases_between_channels_are_right_after_a_calibration(monkeypatch, calibration, corners_hz):
+    found, calibrated_bench = calibration(corners_hz)
     with sound_card(monkeypatch, bench_with(), corners_hz, cables=True) as bench:
         before = phases_deg(bench)
-        found, bench = calibrated(bench, tmp_path)
-        after = phases_deg(bench)
-        with make_daq(bench) as daq:
-            daq.start(bench.block)
+        after = phases_deg(calibrated_bench)
+        with make_daq(calibrated_bench) as daq:
+            daq.start(calibrated_bench.block)
             latency = latency_frames(daq)
     assert np.abs(after).max() < 0.2
     if corners_hz == CORNERS_HZ:
@@ -77,9 +90,8 @@ def test_phases_between_channels_are_right_after_a_calibration(monkeypatch, tmp_
     assert latency == pytest.approx(PERIODS * PERIOD + 0.5 + filters, abs=0.1)
 
 
-def test_a_locked_test_through_high_passes_keeps_to_harmonic_balance(monkeypatch, tmp_path):
-    with sound_card(monkeypatch, bench_with(), CORNERS_HZ, cables=True) as bench:
-        _, bench = calibrated(bench, tmp_path)
+def test_a_locked_test_through_high_passes_keeps_to_harmonic_balance(monkeypatch, calibration):
+    _, bench = calibration(CORNERS_HZ)
     with sound_card(monkeypatch, bench_with(), CORNERS_HZ), rig.run(plan(), bench=bench, seed=5) as run:
         assert run.complete
         points = list(run.recording.latest.values())
