@@ -1,7 +1,7 @@
 """Frames to messages and back, and what becomes of streams that are dropped, doubled, swapped, cut, flipped or foreign."""
 
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -31,9 +31,12 @@ def ends(n_channels: int, fd: bool, block: int, queue: int = 1, node: int = 3) -
     return both[0], both[1]
 
 
+@lru_cache(maxsize=10_000)
 def block_of(j: int, n: int, n_channels: int) -> np.ndarray:
-    """Counts that name their block, row and channel."""
-    return np.random.default_rng(j).integers(-32768, 32768, (n, n_channels)).astype(np.int16)
+    """Counts that name their block, row and channel, not to be written to."""
+    counts = np.random.default_rng(j).integers(-32768, 32768, (n, n_channels)).astype(np.int16)
+    counts.flags.writeable = False
+    return counts
 
 
 def sent(device: CanCodec, blocks: Iterator[int] | range, n: int, n_channels: int) -> list[list[Frame]]:
