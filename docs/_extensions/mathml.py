@@ -15,12 +15,13 @@ from sphinx.util.logging import getLogger
 from sphinx.util.math import get_node_equation_number
 
 log = getLogger(__name__)
+DIGITS = re.compile(r"(frac) *(\d) *(\d)")  # 1 over 2 in TeX, where the converter reads the number 12
 BAR = re.compile(r"<mo([^>]*)>([|‖])</mo>")  # around an absolute value; browsers give it the space of an operator
 
 
 def _markup(translator: Any, node: nodes.Node, block: bool) -> str:
     """Return a formula as MathML; its source, with a warning, where it cannot be converted."""
-    source = node.astext()
+    source = DIGITS.sub(r"\1{\2}{\3}", node.astext())
     several = block and r"\\" in source and r"\begin" not in source
     lines = rf"\begin{{aligned}}{source}\end{{aligned}}" if several else source
     try:
