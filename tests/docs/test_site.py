@@ -131,6 +131,11 @@ GUIDES = {
     "which model": "how-to/which-model",
     "settle": "how-to/set-the-ramp-and-settling",
     "random": "reference/what-this-version-does-not-do",
+    "vibrometer": "how-to/sensors",
+    "amplifier": "how-to/describe-a-bench",
+    "laptop": "how-to/set-up-a-machine",
+    "two modes": "how-to/tune-a-rig",
+    "matlab": "how-to/export-to-other-programs",
 }
 
 
