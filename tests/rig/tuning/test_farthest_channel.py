@@ -46,7 +46,8 @@ def test_the_highest_level_keeps_the_tip_within_its_limit(tuned):
     assert "limits.displacement_m = 0.003 at channel 'acc_magnet'" in tuned.levels.why
 
 
-def test_a_level_asked_for_that_takes_the_tip_beyond_its_limit_is_refused(tmp_path):
+def test_a_level_asked_for_that_takes_the_tip_beyond_its_limit_is_refused(tuned, tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.tuning.tuning.measure", lambda *_: tuned.test)  # the same plant
     with refused(ConfigurationError, field="to_m", value=0.001):
         tune(far_tip(), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02, to_m=0.001))
 

@@ -217,7 +217,7 @@ def test_a_remark_on_the_bench_is_made_once(tmp_path):
 
 
 def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(command, tmp_path):
-    line = "tune --bench magnet-beam -o tuned.toml --level 0.02 --figure tuned.png --law phase --rehearse 2"
+    line = "tune --bench magnet-beam -o tuned.toml --level 0.02 --figure tuned.png --law phase --points 3 --rehearse 2"
     told = json.loads(command(f"{line} --json").succeeded().out)
     assert told["plan"] == "tuned.toml"
     assert told["plant"]["drive_mode_shape"] == pytest.approx(0.908466, rel=2e-3)
