@@ -25,12 +25,12 @@ def whole(tmp_path_factory):
 def test_no_spoilt_file_is_read_with_other_content_unless_that_is_told(tmp_path, whole):
     data, content = whole
     outcomes = Counter()
-    for spoilt in spoilt_files(200, 1, data):
+    for spoilt in spoilt_files(120, 1, data):
         verdict = judge_file(spoilt, tmp_path, content)
         assert verdict.outcome != "misbehaved", (spoilt.kind, spoilt.mutation, verdict.text)
         outcomes[verdict.outcome] += 1
-    assert outcomes["refused"] > 50
-    assert outcomes["told"] > 10
+    assert outcomes["refused"] > 30
+    assert outcomes["told"] > 6
 
 
 @pytest.mark.parametrize("kind", FILE_KINDS)
