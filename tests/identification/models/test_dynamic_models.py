@@ -126,8 +126,8 @@ def test_draws_scatter_as_the_covariance_says():
 
 
 def test_a_band_is_that_of_responses_of_draws():
-    band = response_band(fit_of(structured_duffing(), {"frequency 1": 1e-3}), 0.02, draws=40)
-    assert band.draws == 40
+    band = response_band(fit_of(structured_duffing(), {"frequency 1": 1e-3}), 0.02, draws=20)
+    assert band.draws == 20
     assert band.peak_frequency_std_hz == pytest.approx(25e-3, rel=0.4)
 
 
