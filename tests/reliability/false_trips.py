@@ -19,6 +19,7 @@ from rig.tick.safety.keeping import CHANGED_PERIODS, FAR
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.response_plausibility import OUT_OF_BAND_PERIODS
 from rig.tick.tick import TickSettings
+from tests.recorded import changed
 from tests.rig.rigs import bench_with
 
 BEGIN, END = "<!-- begin of the count of false trips -->\n", "<!-- end of the count of false trips -->\n"
@@ -44,9 +45,9 @@ def held_level_plans() -> list[str]:
     return [name for name in shipped_plans() if load_plan(name).amplitude_law is not AmplitudeLaw.VOLTAGE]
 
 
-def sound_run(name: str, seed: int, noise: float) -> SoundRun:
-    """A shipped plan on its rig, with so many times the noise; no point is evaluated."""
-    plan = load_plan(name)
+def sound_run(name: str, seed: int, noise: float, **changes: object) -> SoundRun:
+    """A shipped plan, with ``changes`` to its keys, on its rig with so many times the noise; no point is evaluated."""
+    plan = changed(name, **changes)
     bench = bench_with(name=bench_of(plan, name).name, noise_scale=noise)
     rate = bench.sample_rate_hz
     with VirtualDAQ(bench, seed) as daq:

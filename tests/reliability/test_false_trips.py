@@ -7,10 +7,13 @@ from rig.tick.safety.layout import EndReason
 from rig.tick.safety.response_plausibility import OUT_OF_BAND_PERIODS
 from tests.reliability.false_trips import SoundRun, held_level_plans, sound_run, table_of
 
+SHORTER = {"friction-beam/dwell": {"cycles": 20_000}}
+"""Its cycles are all alike: a fifth of them is still by far the longest run here. The command runs them all."""
+
 
 @pytest.mark.parametrize("plan", held_level_plans())
 def test_a_sound_rig_with_ten_times_the_noise_never_comes_near_a_trip(plan):
-    run = sound_run(plan, 7, 10.0)
+    run = sound_run(plan, 7, 10.0, **SHORTER.get(plan, {}))
     assert run.reason is EndReason.COMPLETED
     assert run.out_of_band_periods <= OUT_OF_BAND_PERIODS // 2
     assert run.unlike_periods < 0.5
