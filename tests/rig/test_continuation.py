@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from fractions import Fraction
+from random import Random
 
 import numpy as np
 import pytest
@@ -100,6 +101,14 @@ periods = st.one_of(
 ramps = st.one_of(st.just(0), st.integers(1, 80), st.just(2**32 - 1))
 
 
+def some_counts(seed: int, n: int) -> list[int]:
+    """Small, middling, large and largest counts, one beside the other; to draw each of them would take most of the time."""
+    chance = Random(seed)
+    extremes = [(-LARGEST - 1, -LARGEST), (LARGEST - 1, LARGEST)]
+    ends = chance.choices([(-5, 5), (-(2**15), 2**15 - 1), (-LARGEST - 1, LARGEST), *extremes], k=n)
+    return [chance.randint(*one) for one in ends]
+
+
 def test_outputs_far_ahead_from_before_arm_take_no_room_from_those_after_it() -> None:
     device, page = Device(), Page()
     for one in (device, page):
@@ -127,7 +136,7 @@ def test_blocks_in_any_order_are_continued_as_the_page_says(data: st.DataObject,
         if what == "other":
             period = data.draw(periods)
         at = max(0, block - data.draw(st.integers(1, 60))) if what == "old" else block
-        outputs = data.draw(st.lists(counts, min_size=n, max_size=n))
+        outputs = some_counts(data.draw(st.integers(0, 2**32 - 1), label="seed of the counts"), n)
         ramp = data.draw(ramps)
         device.keep(at * n, outputs, period, ramp)
         if what == "old" and (at + 1) * n <= max(page.kept, default=0) + 1 - 2 * LONGEST - 4:
