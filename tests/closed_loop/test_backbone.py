@@ -9,6 +9,7 @@ from rig.bench import load_bench
 from rig.drivers import make_daq
 from rig.show.summary import summarise_recording
 from simulators import VirtualRig
+from tests.recorded import recorded_run
 from tests.reference.harmonic_balance import backbone, backbone_at_voltages
 from tests.reference.parameters import ONE_SIDED, SYMMETRIC
 from tests.reference.sign_detector import sign_lock
@@ -18,7 +19,7 @@ RIGS = {"magnet-beam": ONE_SIDED, "magnet-beam-symmetric": SYMMETRIC}
 
 @pytest.fixture(scope="module", params=list(RIGS))
 def measured(request):
-    with rig.run(f"{request.param}/backbone", seed=11) as run:
+    with recorded_run(f"{request.param}/backbone") as run:
         yield request.param, run, run.backbone()
 
 
@@ -54,7 +55,7 @@ def test_the_backbone_has_the_shift_and_the_damping_of_the_paper(measured):
 
 
 def test_harmonics_of_the_one_sided_force_are_those_of_harmonic_balance():
-    with rig.run("magnet-beam/backbone", seed=3) as run:
+    with recorded_run("magnet-beam/backbone") as run:
         mode = nonlinear_mode(run.backbone())
     truth = backbone(ONE_SIDED, mode.force_n.tolist())
     for harmonic in (2, 3):

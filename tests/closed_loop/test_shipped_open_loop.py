@@ -5,6 +5,7 @@ import pytest
 
 import rig
 from rig.campaigns.plans import load_plan, shipped_plans
+from tests.recorded import recorded_run
 
 SWEEPS = {
     # plan: force off resonance (N), smallest force as part of it; the paper's levels, PHYSICS.md's calibrated rig
@@ -34,7 +35,7 @@ def test_every_shipped_sweep_and_multisine_is_tested_here():
 @pytest.mark.parametrize("name", SWEEPS)
 def test_the_force_of_a_slow_sweep_drops_at_resonance(name):
     force_n, smallest, tolerance = SWEEPS[name]
-    with rig.run(name, seed=5) as run:
+    with recorded_run(name) as run:
         assert run.complete
         point = run.recording.points[0]
     assert point["off_resonance_n"] == pytest.approx(force_n, rel=5e-3)
@@ -42,7 +43,7 @@ def test_the_force_of_a_slow_sweep_drops_at_resonance(name):
 
 
 def test_the_force_of_the_fast_sweep_drops_less_and_overshoots():
-    with rig.run("magnet-beam/sweep-3", seed=5) as run:
+    with recorded_run("magnet-beam/sweep-3") as run:
         point = run.recording.points[0]
     assert point["off_resonance_n"] == pytest.approx(6.5, rel=5e-3)
     assert 0.13 < point["minimum_ratio"] < 0.18  # the narrower the window that is averaged over, the deeper
@@ -62,7 +63,7 @@ def test_a_multisine_has_the_force_it_is_named_after(name):
 
 @pytest.mark.parametrize("name", ["magnet-beam/modal", "friction-beam/modal"])
 def test_a_modal_test_sees_every_listed_mode_well_above_the_noise_at_both_levels(name):
-    with rig.run(name, seed=5) as run:
+    with recorded_run(name, seed=3) as run:
         assert run.complete
         levels = run.spectra()
     assert tuple(levels) == load_plan(name).levels_rms_v

@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-import rig
 from identification import (
     Channel,
     Exciter,
@@ -28,6 +27,7 @@ from identification import (
 from rig.campaigns.plans import plan_from
 from rig.measurements import point_rows
 from simulators import VirtualRig
+from tests.recorded import recorded_run
 from tests.rig.rigs import bench_with
 
 STINGER_N_M = {"magnet-beam": 6283185.0, "friction-beam": 9666439.0}
@@ -36,7 +36,7 @@ GAIN = {"magnet-beam": 1.0, "friction-beam": 10.0}
 
 @cache
 def exciter_of(bench: str, noise: float = 1.0) -> Exciter:
-    with rig.run(f"{bench}/exciter", bench=bench_with(name=bench, noise_scale=noise), seed=3) as run:
+    with recorded_run(f"{bench}/exciter", bench_with(name=bench, noise_scale=noise), seed=3) as run:
         (spectra,) = run.spectra().values()
     return identify_exciter(
         spectra,
@@ -50,7 +50,7 @@ def exciter_of(bench: str, noise: float = 1.0) -> Exciter:
 
 @cache
 def mode_of(bench: str) -> NonlinearMode:
-    with rig.run(f"{bench}/backbone") as run:
+    with recorded_run(f"{bench}/backbone") as run:
         return nonlinear_mode(run.backbone())
 
 
@@ -79,7 +79,7 @@ def modes_of(bench: str) -> LinearModes:
 
 
 def sweep_of(plan: str) -> Transient:
-    with rig.run(plan) as run:
+    with recorded_run(plan) as run:
         (sweep,) = run.sweeps().values()
     return sweep
 
@@ -135,7 +135,7 @@ def test_with_the_force_imposed_a_frequency_error_captures_the_slow_sweep() -> N
 
 def test_with_the_force_by_whole_periods_the_slow_sweep_is_captured_outright() -> None:
     """Founding paper, magnet beam's second sweep: six times too large and far beyond its frequency."""
-    with rig.run("magnet-beam/sweep-2") as run:
+    with recorded_run("magnet-beam/sweep-2") as run:
         ((number, sweep),) = run.sweeps().items()
         force = point_rows(run.recording, number)["inputs"][:, 0].astype(float)
     p = replace(properties_of("magnet-beam"), largest_range_use=np.inf)
@@ -151,7 +151,7 @@ def test_with_the_force_by_whole_periods_the_slow_sweep_is_captured_outright() -
 
 def test_a_constant_voltage_between_the_folds_is_predicted_on_the_states_it_held() -> None:
     plan = {"kind": "stepped-sine", "bench": "magnet-beam", "start_hz": 24.3, "stop_hz": 25.2, "steps": 10}
-    with rig.run(plan_from(plan | {"levels_v": [1.5], "record_periods": 10}, "plan")) as run:
+    with recorded_run(plan_from(plan | {"levels_v": [1.5], "record_periods": 10}, "plan")) as run:
         (reference,) = run.frequency_responses()
     predicted = recorded_force_response(mode_of("magnet-beam"), reference, linear_modes=modes_of("magnet-beam"))
     assert np.count_nonzero(~predicted.stable) >= 3

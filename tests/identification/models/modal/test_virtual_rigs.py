@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-import rig
 from identification import Comparison, FrequencyResponse, NonlinearMode, compare, frequency_response, nonlinear_mode
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response
+from tests.recorded import recorded_run
 
 LEVELS = [
     ("magnet-beam", 0.25),
@@ -24,7 +24,7 @@ ENVELOPE = {"magnet-beam": 0.003, "friction-beam": 0.03}
 
 @cache
 def identified(name: str) -> NonlinearMode:
-    with rig.run(f"{name}/backbone", seed=5) as run:
+    with recorded_run(f"{name}/backbone") as run:
         return nonlinear_mode(run.backbone())
 
 
