@@ -6,11 +6,9 @@ from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
     from identification.experiments.experiment import InitialState as InitialState
+    from identification.experiments.noise import mean_covariance as mean_covariance
     from identification.experiments.periodicity import period_remark as period_remark
     from identification.experiments.simulators import Simulator as Simulator
-    from identification.experiments.time_experiments import (
-        mean_noise as mean_noise,
-        suitable_rate_hz as suitable_rate_hz,
-    )
+    from identification.experiments.time_experiments import suitable_rate_hz as suitable_rate_hz
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

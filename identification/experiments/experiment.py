@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
+from identification.experiments.noise import mean_covariance
 from identification.validation import convert_fields, finite_array, positive
-from vibrolock.arrays import Float
+from vibrolock.arrays import Complex, Float
 
 InitialState = Literal["zero", "estimated"]
 
@@ -48,9 +49,9 @@ class Experiment:
     excited_hz
         Lowest and highest excited frequency; None if unknown. Frequencies that the structure generates, such as harmonics in
         a measured force, do not count as excited.
-    output_noise
-        float[n_outputs, n_lines], standard errors of the amplitudes (peak) of the outputs' lines 1, 2, ... below half the
-        sample rate, from the scatter of periods that were averaged; None if unknown.
+    noise_covariance
+        complex[n_lines, n, n], covariance of the amplitudes (peak) of the lines 1, 2, ... below half the sample rate, of all
+        inputs and then all outputs, from the scatter of periods that were averaged; None if unknown.
     """
 
     inputs: Float
@@ -66,7 +67,7 @@ class Experiment:
     level: float = float("nan")
     specimen: str = ""
     excited_hz: tuple[float, float] | None = None
-    output_noise: Float | None = None
+    noise_covariance: Complex | None = None
 
     def __post_init__(self) -> None:
         convert_fields(self, tuple, "input_channels", "output_channels")
@@ -95,9 +96,11 @@ class Experiment:
         if self.period_samples < 0 or (self.period_samples and self.counted % self.period_samples):
             reason = f"the {self.counted} samples that count are no whole number of periods"
             raise refused(reason, field="period_samples", value=self.period_samples)
-        lines = (len(self.outputs), (self.period_samples + 1) // 2 - 1)
-        if self.output_noise is not None and self.period_samples and np.shape(self.output_noise) != lines:
-            raise refused(f"shape {np.shape(self.output_noise)}", field="output_noise", allowed=lines)
+        rows = len(self.inputs) + len(self.outputs)
+        allowed_shape = ((self.period_samples + 1) // 2 - 1, rows, rows)
+        noise = self.noise_covariance
+        if noise is not None and self.period_samples and np.shape(noise) != allowed_shape:
+            raise refused(f"shape {np.shape(noise)}", field="noise_covariance", allowed=allowed_shape)
         if self.excited_hz is not None and not 0.0 <= self.excited_hz[0] < self.excited_hz[1]:
             allowed = "two rising frequencies, none below zero"
             raise refused(field="excited_hz", value=self.excited_hz, allowed=allowed)
@@ -156,8 +159,15 @@ class Experiment:
         """float[n_outputs, counted]."""
         return np.asarray(self.outputs[:, self.counted_from :])
 
+    @property
+    def output_noise(self) -> Float | None:
+        """float[n_outputs, n_lines]: standard errors of the amplitudes of the outputs' lines; None if unknown."""
+        if self.noise_covariance is None:
+            return None
+        return np.asarray(np.sqrt(np.einsum("kii->ik", self.noise_covariance).real[len(self.inputs) :]))
+
     def averaged(self, *, transient_samples: int | None = None) -> "Experiment":
-        """Return the mean over the counted periods as one settled period, preceded by samples of it (`periodic`).
+        """Return the mean over the counted periods and its noise as one settled period, with samples of it ahead (`periodic`).
 
         If all periods are equally noisy, a fit to the mean gives the same model as a fit to all periods in a fraction of the
         time. None for ``transient_samples`` keeps the number of samples that were not counted. Raises `IdentificationError`
@@ -167,13 +177,17 @@ class Experiment:
             reason = f"experiment '{self.name}': is not periodic, so that there are no periods to average"
             raise IdentificationError(reason)
         ahead = self.counted_from if transient_samples is None else transient_samples
+        size, noise = self.period_samples, self.noise_covariance
+        if noise is None:
+            both = np.vstack([self.counted_inputs, self.counted_outputs])
+            noise = mean_covariance(both.reshape(len(both), -1, size), size)
         means = [
             values.reshape(len(values), -1, self.period_samples).mean(axis=1)[
                 :, np.arange(-ahead, self.period_samples) % self.period_samples
             ]
             for values in (self.counted_inputs, self.counted_outputs)
         ]
-        return replace(self, inputs=means[0], outputs=means[1], counted_from=ahead)
+        return replace(self, inputs=means[0], outputs=means[1], counted_from=ahead, noise_covariance=noise)
 
     def with_constant_input(self, value: float = 1.0) -> "Experiment":
         """Return the experiment with an additional input ``constant`` of one value, whose effect compensates offsets.
@@ -181,9 +195,11 @@ class Experiment:
         Offsets of sensors and amplifiers strongly disturb polynomials and are rarely known well enough to be subtracted. Give
         the input the same value in all experiments, including predicted ones.
         """
+        at, noise = len(self.inputs), self.noise_covariance
         return replace(
             self,
             inputs=np.vstack([self.inputs, np.full((1, self.inputs.shape[1]), positive("value", value))]),
+            noise_covariance=None if noise is None else np.insert(np.insert(noise, at, 0.0, axis=1), at, 0.0, axis=2),
             input_channels=(*self.input_channels, Channel("constant", "monitor", "1")),
         )
 

@@ -38,6 +38,14 @@ class Follower(Protocol):
         """Return the run under the inputs of an experiment."""
 
 
+@runtime_checkable
+class Stepped(Protocol):
+    """A model that is integrated in steps, whose error falls with their square."""
+
+    def with_half_steps(self) -> Simulator:
+        """Return the model with steps of half the length."""
+
+
 def simulated(model: Simulator, experiment: Experiment) -> Simulation:
     """Return the run under the inputs of an experiment: begun in the model's own way, or from rest."""
     return model.simulate_experiment(experiment) if isinstance(model, Follower) else model.simulate(experiment.inputs)

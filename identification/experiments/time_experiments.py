@@ -13,6 +13,7 @@ import numpy as np
 from identification.channels import chosen_rows
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
+from identification.experiments.noise import mean_covariance
 from identification.experiments.periodicity import check_periods
 from identification.experiments.time_records import TimeRecord, TimeRecords
 from identification.signals.decimation import EDGE_SAMPLES, decimated
@@ -87,7 +88,7 @@ def _experiment(
     if records.period_samples:
         periods = resampled_periods(record.samples, records.period_samples, records.sample_rate_hz, rate_hz)
         size = periods.shape[-1]
-        noise = mean_noise(periods[list(out)], size)
+        noise = mean_covariance(periods[[*into, *out]], size)
         ahead = round(records.ahead_periods * size)
         band = band or _band(periods[list(into)].mean(axis=1), rate_hz)
         values = periods.mean(axis=1)[:, np.arange(-ahead, size) % size]
@@ -106,7 +107,7 @@ def _experiment(
         level=record.level,
         specimen=records.specimen,
         excited_hz=band,
-        output_noise=noise,
+        noise_covariance=noise,
     )
 
 
@@ -137,19 +138,6 @@ def resampled_periods(samples: Float, period_samples: int, rate_hz: float, new_r
     if size % 2 == 0:
         lines[..., -1] = 0.0  # half of the line at the Nyquist frequency would have aliased
     return np.asarray(np.fft.irfft(lines, size, axis=-1) * (size / period_samples))
-
-
-def mean_noise(periods: Float, size: int) -> Float | None:
-    """Return the standard errors of the mean's lines (peak) below half of ``size`` per period, float[n_channels, n_lines].
-
-    ``periods`` are float[n_channels, n_periods, n]. Returns None for a single period.
-    """
-    count = periods.shape[1]
-    if count < 2:
-        return None
-    lines = np.fft.rfft(periods, axis=-1)[..., 1 : (size + 1) // 2] * (2.0 / periods.shape[-1])
-    scatter = np.abs(lines - lines.mean(axis=1, keepdims=True)) ** 2
-    return np.asarray(np.sqrt(scatter.sum(axis=1) / ((count - 1) * count)))
 
 
 def _slower(record: TimeRecord, records: TimeRecords, rate_hz: float) -> Float:

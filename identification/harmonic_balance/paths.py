@@ -21,6 +21,10 @@ from vibrolock.arrays import Float
 
 _FIRST_LEVEL = 0.02
 """Share of the level at which Newton's method starts from the linear solution, and a backbone begins. Chosen."""
+_FURTHER_LEVELS = (2e-3, 2e-4, 2e-5)
+"""Shares at which a backbone begins where Newton's method fails there: fewer sliders of a joint slip, at last none. Chosen."""
+_SAME_MODE = 0.1
+"""Relative change of frequency from the linear vibration to the first one of a backbone, if it is of the same mode. Chosen."""
 _LEVELS = Steps(first=0.1, largest=0.5)
 """Steps along the level, in units of half of it. Chosen."""
 _MOST_LEVELS = 300
@@ -143,15 +147,28 @@ def _note(path: Path, begin_hz: float, end_hz: float) -> str:
 
 
 def resonances(balance: DrivenBalance, begin_hz: float, largest_range_use: float, points: int) -> "Resonances":
-    """Follow phase resonance from 2 % of the force that a balance holds up to this force, or as far as it goes."""
-    equations = PhaseResonance(balance)
+    """Follow phase resonance from 2 % of the force that a balance holds up to this force, or as far as it goes.
+
+    It begins at less where Newton's method finds no vibration from the linear one, or another than that of the mode, such as
+    that of an antiresonance, which has the same phase.
+    """
+    equations, scale = PhaseResonance(balance), np.append(sizes(balance, begin_hz), _UNIT * begin_hz)
+
+    def linear(level: float) -> Float:
+        return np.append(balance.linear(begin_hz, level), begin_hz)
+
+    def is_of_the_mode(level: float) -> bool:
+        z = solved(equations, linear(level), level, scale=scale)
+        return z is not None and abs(float(z[-1]) / begin_hz - 1.0) < _SAME_MODE
+
+    first = next((level for level in (_FIRST_LEVEL, *_FURTHER_LEVELS) if is_of_the_mode(level)), _FIRST_LEVEL)
     path = continued(
         equations,
-        np.append(balance.linear(begin_hz, _FIRST_LEVEL), begin_hz),
-        _FIRST_LEVEL,
-        scale=np.append(sizes(balance, begin_hz), _UNIT * begin_hz),
+        linear(first),
+        first,
+        scale=scale,
         parameter_scale=0.5,
-        lowest=0.5 * _FIRST_LEVEL,
+        lowest=0.5 * first,
         highest=1.0,
         points=points,
         steps=Steps(kinks=balance.kinks),

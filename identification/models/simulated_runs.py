@@ -5,8 +5,9 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.experiments.checks import belongs, check_not_zero
 from identification.experiments.experiment import Experiment
+from identification.experiments.residuals import residual_over_noise
 from identification.experiments.simulation import Simulation
-from identification.experiments.simulators import Simulator
+from identification.experiments.simulators import Simulator, Stepped
 from identification.models.balanced_model import begun_at_rest
 from identification.models.dynamic_model import dynamic_model, has_kind
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
@@ -14,7 +15,12 @@ from vibrolock.arrays import Float
 
 
 def simulated_run(
-    model: Simulator, experiment: Experiment, *, initial_state: Float | None = None, use: str = "test"
+    model: Simulator,
+    experiment: Experiment,
+    *,
+    initial_state: Float | None = None,
+    use: str = "test",
+    steps_left: float = 1.0,
 ) -> SimulatedRun:
     """Simulate an experiment.
 
@@ -31,6 +37,8 @@ def simulated_run(
         State before the first sample, float[n_states]; by default rest, or an estimate if the experiment requires it.
     use
         What the experiment is for, as it is stored with the run, such as ``training`` or ``test``.
+    steps_left
+        Share of the errors of the model's steps that its fit has not made up for (`StructuredFit.steps_left`).
     """
     belongs(model, experiment, f"experiment '{experiment.name}'")
     check_not_zero(experiment, f"experiment '{experiment.name}'")
@@ -51,7 +59,19 @@ def simulated_run(
         use=use,
         rms=np.sqrt(np.mean(counted**2, axis=1)),
         peak=np.max(np.abs(counted), axis=1),
+        over_noise=_over_noise(model, experiment, counted, initial_state, steps_left),
     )
+
+
+def _over_noise(
+    model: Simulator, experiment: Experiment, counted: Float, initial_state: Float | None, steps_left: float
+) -> Float:
+    """float[n_outputs]: the residual over the noise and what is left of the errors of the steps, by a run with half of them."""
+    of_steps = None
+    if isinstance(model, Stepped) and experiment.noise_covariance is not None:
+        finer = run_of(model.with_half_steps(), experiment, initial_state).outputs[:, experiment.counted_from :]
+        of_steps = 4.0 / 3.0 * steps_left * (counted - finer)
+    return residual_over_noise(experiment, counted, of_steps)
 
 
 def error_spectra(model: Simulator, linear: Simulator | None, experiment: Experiment) -> ErrorSpectra:

@@ -50,6 +50,9 @@ class SimulatedRun:
     rms, peak
         float[n_outputs], RMS and largest magnitude of the simulated outputs over the samples that count, in their units; NaN
         if unknown or unbounded.
+    over_noise
+        float[n_outputs], RMS of the residual over that of the noise in the excited lines
+        (`identification.experiments.residuals.residual_over_noise`); NaN where the noise is unknown.
     """
 
     name: str
@@ -61,11 +64,12 @@ class SimulatedRun:
     use: str = "test"
     rms: Float = field(default_factory=_unknown)
     peak: Float = field(default_factory=_unknown)
+    over_noise: Float = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         count = len(self.outputs)
-        _shape(self, ("error", "rms", "peak"), (count,), f"one for each of {count} outputs")
+        _shape(self, ("error", "rms", "peak", "over_noise"), (count,), f"one for each of {count} outputs")
 
     @property
     def bounded(self) -> bool:
@@ -74,9 +78,9 @@ class SimulatedRun:
 
     def row(self) -> dict[str, object]:
         """Return JSON-able numbers by name; None for numbers that are unknown or not finite."""
-        errors, rms, peak = (
+        errors, rms, peak, over_noise = (
             {name: _finite(value) for name, value in zip(self.outputs, values, strict=True)}
-            for values in (self.error, self.rms, self.peak)
+            for values in (self.error, self.rms, self.peak, self.over_noise)
         )
         return {
             "name": self.name,
@@ -85,6 +89,7 @@ class SimulatedRun:
             "errors": errors,
             "rms": rms,
             "peak": peak,
+            "over_noise": over_noise,
             "range_use": _finite(self.range_use),
             "unbounded": not self.bounded,
             "unbounded_at_s": self.unbounded_at_s,

@@ -6,11 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from identification import IdentificationError
 from rig.drawing.curves import Curves, View
 from rig.drawing.style import Figure
 from rig.errors import RecordingError
 from rig.figures.curves_of_files import curves_of, families_of, why_not_together
 from rig.figures.overlay_page import draw_over, frequency_of
+from rig.recording.arrays import kind_of
+from rig.results.kinds import KINDS
 
 SIZE_IN = (9.0, 4.2)
 """Width and height of the page, inches; chosen."""
@@ -24,24 +27,42 @@ def overlay(
     The files are recordings of one kind, or recordings and models with the same axes (`rig.figures.curves_of_files`).
     ``labels`` are names in the legend, by default those of the files. Raises `RecordingError` if a file cannot be read, the
     files do not have the same axes, the number of labels is wrong, or a file does not hold what the view asks for, and
-    `IdentificationError` if no point of a file was accepted.
+    `IdentificationError` if no point of a recording was accepted. A model whose curve cannot be computed is left out, and the
+    title says why; if nothing else is left, its error is raised.
     """
     if labels and len(labels) != len(sources):
         raise RecordingError(f"`label`: {len(labels)} for {len(sources)} files; give one for each file, in their order")
     view = view or View()
     family = _common_family(sources)
-    found = [curves_of(path, family, view) for path in sources]
-    for path, curves in zip(sources, found, strict=True):
-        if curves.panels != found[0].panels:
-            axes = [", ".join(f"{panel.y.text} ({panel.y.unit})" for panel in one.panels) for one in (found[0], curves)]
-            raise RecordingError(
-                f"{sources[0]} and {path}: have no common axes: {axes[0]} and {axes[1]}; draw them apart"
-            )
-        _check_limits(path, curves, view)
     names = list(labels) or [path.stem for path in sources]
     if not labels and len(set(names)) < len(names):
         names = [str(path.with_suffix("")) for path in sources]
-    return SIZE_IN, lambda page: draw_over(page, names, _without_references(found), view, family)
+    found, failed = _computed(sources, family, view)
+    drawn = [(path, name) for k, (path, name) in enumerate(zip(sources, names, strict=True)) if k not in failed]
+    for (path, _), curves in zip(drawn, found, strict=True):
+        if curves.panels != found[0].panels:
+            axes = [", ".join(f"{panel.y.text} ({panel.y.unit})" for panel in one.panels) for one in (found[0], curves)]
+            raise RecordingError(
+                f"{drawn[0][0]} and {path}: have no common axes: {axes[0]} and {axes[1]}; draw them apart"
+            )
+        _check_limits(path, curves, view)
+    names, left_out = [name for _, name in drawn], tuple(failed.values())
+    return SIZE_IN, lambda page: draw_over(page, names, _without_references(found), view, family, left_out)
+
+
+def _computed(sources: Sequence[Path], family: str, view: View) -> tuple[list[Curves], dict[int, str]]:
+    """Return the curves of the files, and the errors of those models, by their place, of which none could be computed."""
+    found, failed = [], dict[int, IdentificationError]()
+    for number, path in enumerate(sources):
+        try:
+            found.append(curves_of(path, family, view))
+        except IdentificationError as error:
+            if kind_of(path) not in KINDS:
+                raise
+            failed[number] = error
+    if not found:
+        raise next(iter(failed.values()))
+    return found, {number: str(error) for number, error in failed.items()}
 
 
 def _common_family(sources: Sequence[Path]) -> str:

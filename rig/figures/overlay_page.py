@@ -20,8 +20,18 @@ MOST_LEVELS = len(MARKERS)
 """Of more levels the legend would say nothing."""
 
 
-def draw_over(page: Figure, names: Sequence[str], found: Sequence[Curves], view: View, family: str) -> None:
-    """Draw curves that have the same panels over one another; ``names`` are those of their files."""
+def draw_over(
+    page: Figure,
+    names: Sequence[str],
+    found: Sequence[Curves],
+    view: View,
+    family: str,
+    left_out: Sequence[str] = (),
+) -> None:
+    """Draw curves that have the same panels over one another.
+
+    ``names`` are those of their files; ``left_out`` says in the title what could not be drawn.
+    """
     panels, looks = found[0].panels, Looks(found)
     axes = grid(page, 1, len(panels))[0]
     for n, panel in enumerate(panels):
@@ -41,7 +51,8 @@ def draw_over(page: Figure, names: Sequence[str], found: Sequence[Curves], view:
     specimens = " and ".join(dict.fromkeys(curves.specimen for curves in found if curves.specimen))
     omitted = [f"{name}: {curves.omitted}" for name, curves in zip(names, found, strict=True) if curves.omitted]
     what = names[0] if len(names) == 1 else f"{len(names)} {family}"
-    title(page, f"{specimens or 'specimen'}: {what}" + "".join(f"; not drawn of {text}" for text in omitted))
+    remarks = [*(f"not drawn of {text}" for text in omitted), *(f"not drawn: {text}" for text in left_out)]
+    title(page, "; ".join([f"{specimens or 'specimen'}: {what}", *remarks]))
 
 
 def _show_measured(axis: Axes, found: Sequence[Curves]) -> None:

@@ -75,6 +75,8 @@ class StructuredFit(FitResult):
         RMS of the residual over that of the outputs, every output relative to its own RMS.
     trials
         Which elements were fitted, and what they brought.
+    steps_left
+        Share of the errors of the simulation's steps that no change of the numbers makes up for; 1 if unknown.
     """
 
     model: StructuredModel
@@ -84,6 +86,7 @@ class StructuredFit(FitResult):
     covariance: Float
     training_error: float
     trials: tuple[ElementTrial, ...] = ()
+    steps_left: float = 1.0
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -178,12 +181,13 @@ def fit_structured(
             break
         kept, found = fitted, fitted.model
     assert kept is not None  # the first element is always kept
+    covariance, steps_left = kept.problem.uncertainty(kept.last.vector)
     return StructuredFit(
         model=kept.model.trained_with(experiments),
         start=kept.start,
         names=kept.problem.parameters.names,
         values=kept.last.vector,
-        covariance=kept.problem.covariance(kept.last.vector),
+        covariance=covariance,
         training_error=kept.problem.error(kept.last.vector),
         evaluations=evaluations,
         iterations=iterations,
@@ -191,6 +195,7 @@ def fit_structured(
         status=kept.last.ending.status,
         message=kept.last.ending.message,
         trials=tuple(trials),
+        steps_left=steps_left,
     )
 
 

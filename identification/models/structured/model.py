@@ -226,6 +226,10 @@ class StructuredModel(Result):
         cut = {name: getattr(run_of, name)[:, kept] for name in ("outputs", "states", "acceleration")}
         return replace(run_of, **cut, unbounded_at=first_unbounded(cut["outputs"]))
 
+    def with_half_steps(self) -> "StructuredModel":
+        """Return the model with steps of half the length, which tells the errors of the steps (Richardson)."""
+        return replace(self, steps=2 * self.steps)
+
     def output_selector(self, between: Sequence[str]) -> Float:
         """float[n_outputs]: the displacement at an output, or of one relative to another, as a sum of those of all outputs.
 

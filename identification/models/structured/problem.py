@@ -115,9 +115,10 @@ class Problem:
         parts, tested = self._rows(self._of_one, vector)
         return qr_r(np.concatenate([*parts, self._misfit * tested]))
 
-    def covariance(self, vector: Float) -> Float:
-        """float[P, P]: covariance of the numbers, as if the residual of each experiment were white, with a size of its own.
+    def uncertainty(self, vector: Float) -> tuple[Float, float]:
+        """Return the covariance of the numbers, and the share of the steps' errors that no change of the numbers makes up for.
 
+        The covariance is float[P, P], as if the residual of each experiment were white, with a size of its own.
         The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment; and what the steps of the
         simulation move, to first order, as one error that all numbers share. Errors of outputs fall with the square of the
         step, so that a run with half of it tells them (Richardson).
@@ -133,7 +134,10 @@ class Problem:
             variance = float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
             middle = middle + variance * part[:, :-2].T @ part[:, :-2]
         of_steps = inverse @ (rows[:, :-2].T @ rows[:, -2])
-        return np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
+        covariance = np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
+        column = qr_r(rows[:, :-1])[:, -1]
+        whole = float(np.linalg.norm(column))
+        return covariance, float(abs(column[vector.size]) / whole) if whole > 0.0 and column.size > vector.size else 1.0
 
     def _rows(self, of_one: Callable[..., Float], vector: Float) -> tuple[list[Float], Float]:
         """Return what ``of_one`` gives for each experiment, and the rows of the modal test."""

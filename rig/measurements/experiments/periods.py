@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from identification import Experiment, IdentificationError
-from identification.experiments import mean_noise
+from identification.experiments import mean_covariance
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, result_of
 from rig.campaigns.evaluation.vibrations import channel_factors
@@ -38,11 +38,12 @@ def realisation(
     size = samples_of_a_period(plan, bench, rate_hz)
     noise = None
     if periods == "mean":
-        noise = mean_noise(recorded, size)
+        chosen = [*signals.inputs, *signals.outputs]
+        noise = mean_covariance(recorded[chosen], size)
         if noise is not None:
-            hz = np.arange(1, noise.shape[1] + 1) * bench.sample_rate_hz / recorded.shape[-1]
-            noise[:-1] *= np.abs(channel_factors(bench, hz))
-            noise = noise[list(signals.outputs)]
+            hz = np.arange(1, len(noise) + 1) * bench.sample_rate_hz / recorded.shape[-1]
+            factors = np.vstack([channel_factors(bench, hz), np.ones(hz.size)])[chosen].T  # the last row is the voltage
+            noise = factors[:, :, None] * noise * factors[:, None, :].conj()
         recorded = recorded.mean(axis=1, keepdims=True)
     slow = _resampled(recorded, bench, size, signals.offset)
     once = slow.reshape(slow.shape[0], -1)
@@ -56,7 +57,7 @@ def realisation(
         name=name,
         level=point.level,
         excited_hz=(plan.lowest_hz, plan.highest_hz),
-        output_noise=noise,
+        noise_covariance=noise,
     )
 
 

@@ -30,7 +30,7 @@ class _Facts(TypedDict, total=False):
     counted_from: int
     period_samples: int
     excited_hz: tuple[float, float]
-    output_noise: np.ndarray | None
+    noise_covariance: np.ndarray | None
 
 
 @dataclass(frozen=True)

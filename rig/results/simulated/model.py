@@ -67,6 +67,11 @@ class SimulatedModel(Result):
         """Functions of the user, ``module:name``, that the model names. To simulate it, they are imported."""
         return []
 
+    @property
+    def steps_left(self) -> float:
+        """Share of the errors of the model's steps that its fit has not made up for; 1 if unknown."""
+        return 1.0
+
     def allowed_by_fit(self, count: int) -> list[Simulator] | None:
         """Return models drawn by the covariance of the fit; None if it is unknown."""
         return None
@@ -107,7 +112,7 @@ class SimulatedModel(Result):
         found = replace(
             self,
             runs=tuple(
-                simulated_run(model, one, initial_state=begin, use=use)
+                simulated_run(model, one, initial_state=begin, use=use, steps_left=self.steps_left)
                 for (one, use), begin, model in compress(zip(every, states, models, strict=True), moved)
             ),
             linear_runs=()

@@ -24,6 +24,11 @@ class IdentifiedStructured(SimulatedModel):
         named = [law.function for element in self.model.elements for law in element.laws if isinstance(law, UserSpring)]
         return list(dict.fromkeys(named))
 
+    @property
+    def steps_left(self) -> float:
+        """Share of the errors of the model's steps that its fit has not made up for; 1 if unknown."""
+        return 1.0 if self.fit is None else self.fit.steps_left
+
     def allowed_by_fit(self, count: int) -> list[Simulator] | None:
         """Return models drawn by the covariance of the fit; None if it is unknown."""
         return None if self.fit is None else list(drawn(self.fit, count))

@@ -101,8 +101,9 @@ def test_spectra_of_a_sine_are_its_amplitude_and_that_of_the_error():
     np.testing.assert_allclose(found.error[:, at], 0.1 * np.abs(response), rtol=1e-6)
     np.testing.assert_allclose(found.model[:, at], np.abs(response), rtol=1e-6)
     assert np.isnan(found.noise).all()
-    known = replace(sine, output_noise=np.full((2, 99), 0.01))
-    assert (error_spectra(model(), None, known).noise == 0.01).all()
+    rows = len(sine.inputs) + 2
+    known = replace(sine, noise_covariance=np.full((99, rows, rows), 1e-4 + 0j))
+    np.testing.assert_allclose(error_spectra(model(), None, known).noise, 0.01, rtol=1e-12)
     assert np.isnan(found.linear_error).all()
     with refused(IdentificationError, "not-periodic"):
         error_spectra(model(), None, experiment())

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 
+from identification import IdentificationError
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.multisine.points import recorded_spectra
 from rig.drawing.curves import View
@@ -77,6 +78,23 @@ def test_a_model_lies_over_the_recording_that_it_was_made_of(recordings, drawn, 
     assert {"measured", "50 $ model"} <= set(texts(page))
     with refused(RecordingError, "model-channel-acc-magnet-the-file"):
         overlay([path, tmp_path / "model.h5"], view=View(channel="acc_magnet"))
+
+
+def test_a_model_without_a_curve_is_left_out_and_the_title_says_why(recordings, drawn, tmp_path, monkeypatch):
+    path = recordings["continuous-backbone"]
+    save(identify_model([path], NonlinearModeOptions()), tmp_path / "model.h5")
+
+    def fails(*_):
+        raise IdentificationError("no solution found")
+
+    monkeypatch.setattr("rig.results.nonlinear_mode.views.backbone_curves", fails)
+    page = drawn(overlay([path, tmp_path / "model.h5"]))
+    heading = "".join("".join(texts(page)).split())
+    assert f"notdrawn:{tmp_path / 'model.h5'}" in heading
+    assert "nosolutionfound" in heading
+    assert sum(line.get_marker() in ("o", "s") for line in page.axes[0].get_lines()) == 1
+    with refused(IdentificationError, where=tmp_path / "model.h5"):
+        overlay([tmp_path / "model.h5"])
 
 
 def test_a_decay_lies_over_a_backbone_as_a_line(recordings, drawn, tmp_path):

@@ -16,6 +16,7 @@ from identification.models import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpr
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
 from rig.results.files import load, save
+from rig.results.simulated.table import noise_verdict
 from rig.results.structured.figure import draw_structured
 from rig.results.structured.model import IdentifiedStructured
 from rig.results.structured.options import StructuredOptions
@@ -102,6 +103,26 @@ def test_errors_of_modes_that_no_law_moves_are_those_of_the_fit(there, recording
         of_frequency, of_damping = (errors.get(f"{name} {index}", 0.0) for name in ("frequency", "damping"))
         assert mode["frequency_std_hz"] == pytest.approx(of_frequency * mode["frequency_hz"], rel=1e-2, abs=1e-9)
         assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-2, abs=1e-12)
+
+
+def test_the_residual_is_compared_with_the_noise(there):
+    said = there("show S.h5").out.splitlines()
+    (heading,) = (line for line in said if "range use" in line)
+    assert heading.split()[-1] == "residual/noise"
+    training, *_ = (run for run in json.loads(there("show S.h5 --json").out)["errors"] if run["use"] == "training")
+    assert 0.3 < training["over_noise"]["drive"] < 3.0
+    assert said[-1] == noise_verdict([training])
+
+
+def _run(use="training", **over_noise):
+    return {"name": f"{use} data", "use": use, "over_noise": over_noise}
+
+
+def test_the_verdict_names_the_output_and_the_experiment_with_the_largest_residual():
+    assert noise_verdict([_run(drive=None)]) == noise_verdict([_run("validation", drive=50.0)]) == ""
+    assert "at most 2.9 times" in noise_verdict([_run(drive=2.9, tip=1.0), _run("validation", drive=50.0)])
+    said = noise_verdict([_run(drive=2.9, tip=41.2), _run(drive=3.1)])
+    assert "41.2 times the noise (tip, training data)" in said
 
 
 def test_multisines_have_the_errors_of_the_file(there):

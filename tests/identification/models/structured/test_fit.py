@@ -7,9 +7,10 @@ import pytest
 
 from identification import Channel, IdentificationError
 from identification.experiments.experiment import Experiment
+from identification.models.simulated_runs import simulated_run
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.fit import fit_structured, not_identified
-from identification.models.structured.laws import PolynomialDamper, PolynomialSpring
+from identification.models.structured.laws import Jenkins, PolynomialDamper, PolynomialSpring
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
 from tests.refused import refused
@@ -76,6 +77,43 @@ def test_a_support_that_the_data_do_not_show_is_said_to_be_not_identified():
     unknown = not_identified(found)
     assert "support" in unknown
     assert not {"frequency 1", "damping 1"} & set(unknown)  # the second mode lies above the band
+
+
+def _periods(model, seed, noise=1e-3, periods=6, steps=20):
+    """The mean over noisy periods of a truth that is simulated with finer steps than the fit's."""
+    inputs = np.tile(multisine(2.0, seed), 8 + periods)
+    both = np.vstack([inputs, replace(model, steps=steps).simulate(inputs).outputs])[:, -2000 * periods :]
+    both += noise * np.std(both, axis=1, keepdims=True) * np.random.default_rng(seed).standard_normal(both.shape)
+    return Experiment(
+        inputs=both[:1],
+        outputs=both[1:],
+        sample_rate_hz=RATE_HZ,
+        input_channels=(FORCE,),
+        output_channels=OUTPUTS,
+        period_samples=2000,
+        excited_hz=(15.0, 35.0),
+    ).averaged(transient_samples=2000)
+
+
+JOINT = beam(elements=(replace(ELEMENT, laws=(PolynomialSpring((3.0,)), Jenkins(3.0, 1.0))),), support_n_m=0.0)
+
+
+@pytest.mark.parametrize(
+    ("true", "laws", "largest", "least"),
+    [
+        (TRUE, LAWS, 3.0, 0.3),
+        (JOINT, (PolynomialSpring((3.0,)), Jenkins(2.5, 0.8)), 3.0, 0.3),
+        (JOINT, LAWS, np.inf, 30.0),
+        (TRUE, (PolynomialSpring((3.0,)),), np.inf, 300.0),
+    ],
+    ids=["cubic", "joint", "joint by a polynomial", "cubic by a linear spring"],
+)
+def test_noise_explains_the_residual_of_a_right_structure_and_not_of_a_wrong_one(true, laws, largest, least):
+    data = _periods(true, 3)
+    found = fit_structured(linear_modes(true, 1), [data], support=False, laws=laws)
+    ratio = simulated_run(found.model, data, steps_left=found.steps_left).over_noise
+    assert np.all(ratio < largest)
+    assert np.all(ratio > least)
 
 
 @pytest.mark.slow

@@ -1,0 +1,70 @@
+"""What noise explains of the residual of a model."""
+
+import numpy as np
+
+from identification.experiments.experiment import Experiment
+from vibrolock.arrays import Complex, Float
+
+_EXCITED, _ABOVE_NOISE = 1e-2, 10.0
+"""Amplitude of an excited line relative to the largest of its input, and to its standard error, at least. Chosen."""
+_DRIVEN = 1e-6
+"""Amplitude of a line relative to the RMS of its input, below which the input is constant. Chosen."""
+_FEWEST_LINES = 20
+"""Excited lines without which the residual is not held against the noise. With so many lines and two periods, noise alone
+exceeds a ratio of 2 in fewer than one of ten thousand cases (F distribution with 40 and 40 degrees of freedom)."""
+
+
+def residual_over_noise(experiment: Experiment, simulated: Float, of_steps: Float | None = None) -> Float:
+    """Return the RMS of a model's residual over that of the noise, float[n_outputs], in the excited lines of a periodic record.
+
+    The noise of a line is that of ``Y - G U``: outputs Y, inputs U and G, the response of the model from input to output in
+    this line. Noise in the input counts, and noise that both share, such as that of a shaker, does not. A right model has a
+    ratio near 1. Beyond 2 it misses more than noise explains.
+
+    NaN where this is unknown: a record that is not periodic, without the scatter of its periods, with several inputs or with
+    fewer than 20 excited lines. Not seen are errors beyond the excited lines, and what every period repeats, such as an error
+    of a sensor's gain.
+
+    Parameters
+    ----------
+    experiment
+        The record.
+    simulated
+        float[n_outputs, counted], outputs of the model with its inputs.
+    of_steps
+        float[n_outputs, counted], what the steps of the simulation get wrong in them; it counts as noise. None for nothing.
+    """
+    unknown = np.full(len(experiment.outputs), np.nan)
+    covariance, inputs = experiment.noise_covariance, len(experiment.inputs)
+    of_steps = np.zeros_like(simulated) if of_steps is None else of_steps
+    if covariance is None or not experiment.period_samples or not np.isfinite(simulated + of_steps).all():
+        return unknown
+    u, y, z = (_lines(v, experiment) for v in (experiment.counted_inputs, experiment.counted_outputs, simulated))
+    rms = np.sqrt(np.mean(experiment.counted_inputs**2, axis=1))
+    driven = np.flatnonzero(np.abs(u).max(axis=1) > _DRIVEN * rms)  # a constant input is not
+    if driven.size != 1:
+        return unknown
+    size, noise = np.abs(u[driven[0]]), np.sqrt(covariance[:, driven[0], driven[0]].real)
+    excited = (size > _EXCITED * size.max()) & (size > _ABOVE_NOISE * noise) & _in_band(experiment, size.size)
+    if np.count_nonzero(excited) < _FEWEST_LINES:
+        return unknown
+    weights = np.zeros((int(np.count_nonzero(excited)), len(y), inputs + len(y)), complex)
+    weights[:, :, inputs:] = np.eye(len(y))
+    weights[:, :, driven[0]] = -(z[:, excited] / u[driven[0], excited]).T
+    power = np.einsum("kij,kjl,kil->i", weights, covariance[excited], weights.conj()).real
+    power += np.sum(np.abs(_lines(of_steps, experiment)[:, excited]) ** 2, axis=1)
+    residual = np.sum(np.abs(z - y)[:, excited] ** 2, axis=1)
+    return np.asarray(np.sqrt(np.divide(residual, power, out=unknown, where=power > 0.0)))
+
+
+def _lines(values: Float, experiment: Experiment) -> Complex:
+    period = experiment.period_samples
+    mean = values.reshape(len(values), -1, period).mean(axis=1)
+    return np.asarray(np.fft.rfft(mean, axis=1)[:, 1 : (period + 1) // 2] * (2.0 / period))
+
+
+def _in_band(experiment: Experiment, lines: int) -> np.ndarray:
+    lowest, highest = experiment.excited_hz or (0.0, np.inf)
+    hz = np.arange(1, lines + 1) * experiment.sample_rate_hz / experiment.period_samples
+    half = 0.5 * experiment.sample_rate_hz / experiment.period_samples
+    return np.asarray((hz > lowest - half) & (hz < highest + half))

@@ -1,0 +1,127 @@
+"""A residual is held against the noise: a right model has a ratio of 1, a wrong one that of the closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import Channel, Experiment, IdentificationError
+from identification.experiments.noise import mean_covariance
+from identification.experiments.residuals import residual_over_noise
+from tests.refused import refused
+
+SIZE, PERIODS, RATE_HZ = 1000, 6, 500.0
+LINES = np.arange(20, 121)
+"""Excited lines: 10 to 60 Hz."""
+FORCE, DRIVE, TIP = (
+    Channel("force", "force", "N"),
+    Channel("drive", "drive", "m/s2"),
+    Channel("tip", "response", "m/s2"),
+)
+HZ = np.fft.rfftfreq(SIZE, 1.0 / RATE_HZ)
+RESPONSE = np.array([HZ**2 / (25.0**2 - HZ**2 + 2j * 0.02 * 25.0 * HZ) * gain for gain in (1.0, -2.0)])
+
+
+def _periods(random, count=PERIODS, shaken=0.0, force=0.0, outputs=0.0):
+    """Force and outputs [3, periods, SIZE]: noise of the shaker, which the structure follows, and of each sensor (RMS)."""
+    lines = np.zeros((count, SIZE // 2 + 1), complex)
+    lines[:, LINES] = SIZE * np.exp(2j * np.pi * np.random.default_rng(1).random(LINES.size))
+    lines += np.fft.rfft(shaken * random.standard_normal((count, SIZE)))
+    both = np.fft.irfft(np.array([lines, *(RESPONSE[:, None] * lines)]), SIZE)
+    sensors = np.array([force, outputs, outputs])[:, None, None]
+    return both + sensors * random.standard_normal(both.shape)
+
+
+def _experiment(periods) -> Experiment:
+    whole = periods.reshape(3, -1)
+    of_periods = Experiment(
+        inputs=whole[:1],
+        outputs=whole[1:],
+        sample_rate_hz=RATE_HZ,
+        input_channels=(FORCE,),
+        output_channels=(DRIVE, TIP),
+        period_samples=SIZE,
+        excited_hz=(10.0, 60.0),
+    )
+    return of_periods.averaged(transient_samples=0)
+
+
+def _simulated(experiment, gain=1.0):
+    return gain * np.fft.irfft(RESPONSE * np.fft.rfft(experiment.counted_inputs), SIZE)
+
+
+@pytest.mark.parametrize("noise", [{"outputs": 0.05}, {"force": 0.01}, {"shaken": 0.2, "force": 0.01, "outputs": 0.05}])
+def test_a_right_model_has_a_ratio_of_one_whatever_the_noise_is_in(noise):
+    random = np.random.default_rng(5)
+    ratios = [
+        residual_over_noise(one, _simulated(one)) for one in (_experiment(_periods(random, **noise)) for _ in range(40))
+    ]
+    squares = np.mean(np.square(ratios), axis=0)
+    # the lines about the resonance, where noise of the force is large, are few: 40 records of some ten lines
+    np.testing.assert_allclose(squares, 1.0, atol=0.25)
+    assert np.max(ratios) < 2.0
+
+
+def test_a_wrong_gain_gives_what_it_misses_over_the_noise():
+    random = np.random.default_rng(6)
+    one = _experiment(_periods(random, outputs=0.05))
+    lines = np.sum(
+        np.abs(RESPONSE[:, LINES]) ** 2 * 4.0, axis=1
+    )  # power of the outputs: amplitudes of 2 times the response
+    noise = LINES.size * 4.0 * 0.05**2 / (SIZE * PERIODS)
+    expected = 0.01 * np.sqrt(lines / noise)
+    assert np.all(expected > 5.0)
+    np.testing.assert_allclose(residual_over_noise(one, _simulated(one, 1.01)), expected, rtol=0.15)
+
+
+def test_errors_of_the_steps_count_as_noise():
+    one = _experiment(_periods(np.random.default_rng(6), outputs=0.05))
+    wrong = _simulated(one, 1.01)
+    of_steps = wrong - _simulated(one)
+    assert np.all(residual_over_noise(one, wrong) > 5.0)
+    assert np.all(residual_over_noise(one, wrong, of_steps) < 1.1)
+
+
+@pytest.mark.parametrize("case", ["one period", "not periodic", "two inputs", "few lines", "unbounded"])
+def test_where_the_noise_is_unknown_there_is_no_ratio(case):
+    random = np.random.default_rng(7)
+    one = _experiment(_periods(random, count=1 if case == "one period" else PERIODS, outputs=0.05))
+    simulated = _simulated(one)
+    match case:
+        case "not periodic":
+            one = replace(one, period_samples=0)
+        case "two inputs":
+            one = replace(
+                one,
+                inputs=np.vstack([one.inputs, one.inputs]),
+                input_channels=(FORCE, Channel("second", "force", "N")),
+                noise_covariance=np.zeros((SIZE // 2 - 1, 4, 4), complex),
+            )
+        case "few lines":
+            one = replace(one, excited_hz=(10.0, 18.0))
+        case "unbounded":
+            simulated = np.full_like(simulated, np.nan)
+    assert np.isnan(residual_over_noise(one, simulated)).all()
+
+
+def test_a_constant_input_has_no_noise_and_leaves_the_ratio():
+    one = _experiment(_periods(np.random.default_rng(8), outputs=0.05))
+    simulated = _simulated(one)
+    found = residual_over_noise(one.with_constant_input(), simulated)
+    np.testing.assert_allclose(found, residual_over_noise(one, simulated), rtol=1e-12)
+
+
+def test_the_covariance_of_the_mean_is_that_of_white_noise():
+    """Standard deviation of a line's amplitude ``s sqrt(4 / (N P))``; two channels with the same noise are fully coherent."""
+    noise = 0.3 * np.random.default_rng(9).standard_normal((1, PERIODS, SIZE))
+    found = mean_covariance(np.vstack([noise, 2.0 * noise]), SIZE)
+    assert found.shape == (SIZE // 2 - 1, 2, 2)
+    assert np.mean(found[:, 0, 0].real) == pytest.approx(4.0 * 0.3**2 / (SIZE * PERIODS), rel=0.1)
+    np.testing.assert_allclose(found[:, 0, 1], 2.0 * found[:, 0, 0], rtol=1e-12)
+    assert mean_covariance(noise[:, :1], SIZE) is None
+
+
+def test_a_covariance_of_another_shape_is_refused():
+    one = _experiment(_periods(np.random.default_rng(8)))
+    with refused(IdentificationError, field="noise_covariance", allowed="499, 3, 3"):
+        replace(one, noise_covariance=np.zeros((3, 3), complex))
