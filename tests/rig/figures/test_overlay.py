@@ -93,7 +93,7 @@ def test_a_model_without_a_curve_is_left_out_and_the_title_says_why(recordings, 
     assert f"notdrawn:{tmp_path / 'model.h5'}" in heading
     assert "nosolutionfound" in heading
     assert sum(line.get_marker() in ("o", "s") for line in page.axes[0].get_lines()) == 1
-    with refused(IdentificationError, where=tmp_path / "model.h5"):
+    with refused(IdentificationError, where=str(tmp_path / "model.h5")):
         overlay([tmp_path / "model.h5"])
 
 

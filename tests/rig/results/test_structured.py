@@ -114,15 +114,18 @@ def test_the_residual_is_compared_with_the_noise(there):
     assert said[-1] == noise_verdict([training])
 
 
-def _run(use="training", **over_noise):
-    return {"name": f"{use} data", "use": use, "over_noise": over_noise}
+def _run(use="training", error=0.01, **over_noise):
+    return {"name": f"{use} data", "use": use, "over_noise": over_noise, "errors": dict.fromkeys(over_noise, error)}
 
 
 def test_the_verdict_names_the_output_and_the_experiment_with_the_largest_residual():
     assert noise_verdict([_run(drive=None)]) == noise_verdict([_run("validation", drive=50.0)]) == ""
     assert "at most 2.9 times" in noise_verdict([_run(drive=2.9, tip=1.0), _run("validation", drive=50.0)])
     said = noise_verdict([_run(drive=2.9, tip=41.2), _run(drive=3.1)])
-    assert "41.2 times the noise (tip, training data)" in said
+    assert "41.2 times the noise, 1 % (tip, training data): the model lacks something" in said
+    small = noise_verdict([_run(error=8.5e-4, drive=7.5)])
+    assert small == "the residual is 7.5 times the noise, but small, 0.085 % (drive, training data)"
+    assert "3.5 times the noise, 1 %" in noise_verdict([_run(error=8.5e-4, drive=7.5), _run(drive=3.5)])
 
 
 def test_multisines_have_the_errors_of_the_file(there):
