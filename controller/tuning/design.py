@@ -195,16 +195,16 @@ def _reasons(
         out.append(f"the loop is unstable {where}: {count} pole(s) in the right half plane{growth}")
     elif frequency.sensitivity_peak > POOR_SENSITIVITY:
         out.append(
-            f"the frequency loop hardly holds {where}: max |S| = {frequency.sensitivity_peak:.2f}, "
+            f"the frequency loop is barely stable {where}: max |S| = {frequency.sensitivity_peak:.2f}, "
             f"allowed is {POOR_SENSITIVITY:g}"
         )
     elif amplitude is not None and amplitude.sensitivity_peak > POOR_SENSITIVITY:
         kind = "complex response control" if isinstance(loop.amplitude_law, ComplexResponseLaw) else "amplitude loop"
         peak = amplitude.sensitivity_peak
-        out.append(f"the {kind} hardly holds {where}: max |S| = {peak:.2f}, allowed is {POOR_SENSITIVITY:g}")
+        out.append(f"the {kind} is barely stable {where}: max |S| = {peak:.2f}, allowed is {POOR_SENSITIVITY:g}")
     if loop.plant.fit_error > POOR_FIT:
         out.append(
-            f"the plant's model misses its measurement by {100.0 * loop.plant.fit_error:.0f} %, "
+            f"the plant model differs from its measurement by {100.0 * loop.plant.fit_error:.0f} %, "
             f"allowed is {100.0 * POOR_FIT:.0f} %: another mode inside the band, or a nonlinear or noisy test"
         )
     if loop.plant.coupled_pole_rad_s.real >= 0.0:

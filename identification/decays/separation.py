@@ -72,7 +72,7 @@ def separated(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> t
                 raise IdentificationError(reason, field="near_hz")
             continue
         if any(one is not other and other.track.holds(track.start_hz) for other in found):
-            why = f"the vibration at {one.middle_hz:.4g} Hz leads to that of a neighbour"
+            why = f"the vibration at {one.middle_hz:.4g} Hz converges to that of a neighbour"
             IdentificationError.raise_if(one.asked, why, field="near_hz")
             continue
         chosen.append(Candidate(track, periods))
@@ -99,7 +99,7 @@ def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tupl
             reason = f"no vibration near {near:g} Hz"
             raise IdentificationError(reason, field="near_hz", hint=f"peaks of the spectrum, Hz: {listed}")
         if any(other.track.holds(new.track.start_hz) for other in found):
-            reason = f"{near:g} Hz leads to a mode that is named already, each one once"
+            reason = f"{near:g} Hz converges to a mode that is already named; name each once"
             raise IdentificationError(reason, field="near_hz")
         found.append(new)
     for peak in peaks:
@@ -116,7 +116,7 @@ def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tupl
             harmonics.append(new.track)
             notes.append(
                 f"{new.middle_hz:.4g} Hz: harmonic {of[1]} of the mode at {of[0].middle_hz:.4g} Hz, or a mode that cannot be "
-                "told from it"
+                "distinguished from it"
             )
     return found, notes
 
@@ -189,7 +189,7 @@ def _neighbour(one: _Found, other: _Found, periods: int) -> tuple[float, str]:
         if order * theirs[0] < 2.0 * own[1]:
             text = (
                 f"{one.middle_hz:.4g} Hz is near harmonic {order} of the mode at {other.middle_hz:.4g} Hz, from which it "
-                "cannot be told"
+                "cannot be distinguished"
             )
             found.append((_through(order * theirs, own, periods) * gain * _OF_A_HARMONIC ** (order - 1), text))
     return max(found)

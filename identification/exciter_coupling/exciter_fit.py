@@ -105,19 +105,21 @@ def identify_exciter(
     if _COMPLIANCE in free and not _is_told(values, covariance, _COMPLIANCE):
         free.remove(_COMPLIANCE)
         values, covariance, residual = _fit(data, start, free, per_square)
-        notes += ("the stinger's compliance cannot be told from these data: taken as rigid; give its stiffness",)
+        notes += ("the stinger's compliance cannot be identified from these data: taken as rigid; give its stiffness",)
     else:
         damped = _fit(data, values, [*free, _STINGER_TIME], per_square)
         if _is_told(*damped[:2], _STINGER_TIME):
             values, covariance, residual = damped
     if resistance_ohm is None:
-        notes += ("suspension damping and back-EMF are told apart by the coil's inductance alone: trust their sum",)
+        notes += (
+            "suspension damping and back-EMF are distinguished by the coil's inductance alone: rely on their sum only",
+        )
     _refuse_unphysical(values)
     notes += beside_resonance(values, float(data.frequency_hz[0]), float(data.frequency_hz[-1]))
     spread = np.sqrt(np.diag(covariance))
     for name, value, std in zip(PARAMETERS, values, spread, strict=False):
         if std > _UNSURE * abs(value):
-            notes += (f"{name}: {value:.3g} with a standard error of {std:.2g}; a wider band tells it better",)
+            notes += (f"{name}: {value:.3g} with a standard error of {std:.2g}; a wider band determines it better",)
     if residual > _MISFIT:
         notes += (f"misfit is {residual:.1f} times the noise: amplifier or exciter are not linear, or not in step",)
     return Exciter(
@@ -158,7 +160,7 @@ def beside_resonance(values: Float, lowest_hz: float, highest_hz: float) -> tupl
         return ()
     return (
         f"the band does not enclose the resonance of the suspension, {resonance_hz:.3g} Hz: use the model inside the band "
-        "alone, its errors do not say what is off outside",
+        "alone, its errors do not cover what lies outside",
     )
 
 

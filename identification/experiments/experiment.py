@@ -94,7 +94,7 @@ class Experiment:
             allowed = f"0 to {n - 1}, one sample at least must count"
             raise refused(field="counted_from", value=self.counted_from, allowed=allowed)
         if self.period_samples < 0 or (self.period_samples and self.counted % self.period_samples):
-            reason = f"the {self.counted} samples that count are no whole number of periods"
+            reason = f"the {self.counted} samples that count are not a whole number of periods"
             raise refused(reason, field="period_samples", value=self.period_samples)
         rows = len(self.inputs) + len(self.outputs)
         allowed_shape = ((self.period_samples + 1) // 2 - 1, rows, rows)

@@ -55,7 +55,7 @@ def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Non
 class TimeRecords(Result):
     """Evenly sampled records of the same channels at one sample rate.
 
-    Raises `IdentificationError` if shapes do not agree, a record is no whole number of periods, names are used twice
+    Raises `IdentificationError` if shapes do not agree, a record is not a whole number of periods, names are used twice
     or an instrument does not exist.
 
     Parameters
@@ -112,7 +112,7 @@ class TimeRecords(Result):
             if rows != len(names) or not count:
                 raise IdentificationError(f"record {number}: shape {(rows, count)}, needs {len(names)} rows of samples")
             if self.period_samples < 0 or (self.period_samples and count % self.period_samples):
-                reason = f"record {number}: has {count} samples, no whole number of periods of {self.period_samples}"
+                reason = f"record {number}: has {count} samples, not a whole number of periods of {self.period_samples}"
                 raise IdentificationError(reason)
 
     @property

@@ -42,7 +42,7 @@ MESSAGES = {
     FitStatus.NO_FURTHER_GAIN: "{count} iterations did not lower the {error} error{by}",
     FitStatus.ITERATION_LIMIT: "stopped at its limit of {limit} iterations",
     FitStatus.STILL_IMPROVING: (
-        "stopped at its limit of {limit} iterations while it still paid: {of} lowered the {error} error by {gain:.2g} %"
+        "stopped at its limit of {limit} iterations while still improving: {of} lowered the {error} error by {gain:.2g} %"
     ),
     FitStatus.INTERRUPTED: "interrupted",
     FitStatus.UNBOUNDED: "the sensitivities of the last iterate leave all bounds",

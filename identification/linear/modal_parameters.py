@@ -178,7 +178,7 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
         if windowed / float(data.frequency_hz[above] - data.frequency_hz[above - 1]) < _LINES_PER_BANDWIDTH:
             notes.append(
                 f"mode at {f:.5g} Hz: half-power bandwidth {width:.3g} Hz holds {lines} lines; record longer periods for "
-                "a damping ratio to rely on"
+                "a reliable damping ratio"
             )
     for f, collinear in zip(frequency, modes.phase_collinearity, strict=True):
         if collinear < _COLLINEAR:
@@ -193,6 +193,7 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
         notes.append("errors from noise and misfit; two realisations or more show nonlinear distortion line by line")
     if modes.fit_residual > _LARGEST_RESIDUAL:
         notes.append(
-            f"misfit is {modes.fit_residual:.2f} times what its errors let expect: modes missing, or not linear at this level"
+            f"misfit is {modes.fit_residual:.2f} times what its errors would explain: modes missing, or not linear "
+            "at this level"
         )
     return notes

@@ -54,7 +54,7 @@ class ModeShapes:
                 reason = f"shape {covariance.shape} for {shapes.size} shape values"
                 raise IdentificationError(reason, field="covariance")
         if not shapes.shape[1] or np.linalg.matrix_rank(shapes) < shapes.shape[1]:
-            reason = f"{shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes"
+            reason = f"{shapes.shape[1]} modes cannot be distinguished by {shapes.shape[0]} channels; use fewer modes"
             raise IdentificationError(reason, field="shapes")
         IdentificationError.unless_between("mode", self.mode, 0, shapes.shape[1] - 1)
 

@@ -70,8 +70,8 @@ def systematic_misfit(data: WeightedResponses, fit: ModalFit, *, normal: bool) -
         if np.any((alike > _ALIKE) & (share > _MISFIT)):
             worst = 100.0 * float(np.max(share[alike > _ALIKE]))
             notes.append(
-                f"mode at {omega / (2.0 * np.pi):.5g} Hz: the misfit is {worst:.2g} % of the response and no noise, for "
-                "neighbouring lines have it in common: another mode close by, or not linear; the intervals do not hold it"
+                f"mode at {omega / (2.0 * np.pi):.5g} Hz: the misfit is {worst:.2g} % of the response and not noise, "
+                "as neighbouring lines share it: another mode nearby, or a nonlinear response; the intervals do not include it"
             )
     return notes
 
@@ -123,7 +123,7 @@ def with_model_error(
     taken = "the latter is used" if free else "the former was asked for"
     notes = [
         f"mode at {f:.5g} Hz: distortion is large at this level, the response is not that of a linear mode; damping ratio "
-        f"{100 * a:.3g} % by weights from {data.kind}, {100 * b:.3g} % by relative weights; {taken}, intervals hold both"
+        f"{100 * a:.3g} % by weights from {data.kind}, {100 * b:.3g} % by relative weights; {taken}, intervals include both"
         for f, a, b in zip(other.omega / (2.0 * np.pi), fit.zeta, other.zeta, strict=True)
     ]
     chosen, responses = (other, relative) if free else (fit, data)

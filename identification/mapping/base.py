@@ -35,7 +35,7 @@ def value_at(data: Any, path: str, where: str) -> Any:
     if path == ".":
         return data
     if not _PATH.fullmatch(path):
-        reason = f"{where}: '{path}' is no path; write names joined by dots, with [0] for list entries"
+        reason = f"{where}: '{path}' is not a path; write names joined by dots, with [0] for list entries"
         raise IdentificationError(reason)
     value = data
     walked = ""

@@ -227,7 +227,7 @@ def _cut(raw: Sequence[_Raw], mapping: TimeDataMapping, rate_hz: float) -> tuple
             level = mapping.stretches[which].level if mapping.stretches else None
             group = one.group if level is None else groups + which
             found.append(_Raw(part, rate_hz * ratio, group, one.period_samples, level))
-    notes = (f"{left} samples at the end of a record are no whole period and were left out",) if left else ()
+    notes = (f"{left} samples at the end of a record are not a whole period and were left out",) if left else ()
     return found, notes
 
 

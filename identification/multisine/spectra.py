@@ -211,5 +211,5 @@ def _folding(design: MultisineDesign) -> tuple[str, ...]:
         return ()
     return (
         f"sampled at {design.sample_rate_hz:g} Hz, products of degree {degree} of a band up to {design.highest_hz:g} Hz fold "
-        "back into it unless a filter holds them off: distortion may be theirs",
+        "back into it unless a filter removes them: they may be part of the distortion",
     )

@@ -40,7 +40,7 @@ from identification.validation import one_specimen
 from vibrolock.arrays import Float
 
 _NO_SHAPE = (
-    "no mass-normalised mode shape: damping, modal amplitude and the correction for the phase error cannot be had; "
+    "no mass-normalised mode shape: damping, modal amplitude and the correction for the phase error cannot be computed; "
     "give drive_mode_shape or mode_shapes"
 )
 _FAR_FROM_RESONANCE_DEG = 15.0  # deg; a lag farther from 90 deg is noted; chosen
@@ -139,7 +139,7 @@ def _refuse(name: str, point: PeriodicVibration) -> None:
         if size < _DROWNED * std:
             unit = point.channels[row].unit
             raise IdentificationError(
-                f"{what} {size:.3g} {unit} drowns in its standard error of {std:.3g} {unit}; record more "
+                f"{what} {size:.3g} {unit} is lost in its standard error of {std:.3g} {unit}; record more "
                 "periods, raise the level, or leave the point out (backbone.select)",
                 where=name,
             )
@@ -213,8 +213,8 @@ def _notes(backbone: Backbone, shapes: ModeShapes | None) -> tuple[str, ...]:
     levels = np.unique(np.round(np.log(backbone.amplitude_m), 2)).size
     if levels < _FEW_LEVELS:
         notes.append(
-            f"{levels} level{'s' if levels > 1 else ''} only: intervals are those of the levels, what lies between them or "
-            "beyond is not in them"
+            f"{levels} level{'s' if levels > 1 else ''} only: the intervals hold at the levels, not between them or "
+            "beyond"
         )
     if any(point.phase_lag_deg < 0.0 for point in backbone.points):
         notes.append(

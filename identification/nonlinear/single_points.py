@@ -109,9 +109,7 @@ def _identified(
     if given > frequency.size:
         notes.append(f"{given - frequency.size} of {given} points left out: too far from phase resonance")
     if far:
-        notes.append(
-            f"{far} points are more than {_FAR_DEG:g} deg from phase resonance: their damping is the less certain"
-        )
+        notes.append(f"{far} points are more than {_FAR_DEG:g} deg from phase resonance: their damping is less certain")
     return NonlinearMode(
         force_n=np.abs(force),
         frequency_hz=frequency,

@@ -213,7 +213,7 @@ def _notes(
     fitted: Sequence[tuple[FrequencyResponse, _LevelFit]],
     window_deg: float,
 ) -> tuple[str, ...]:
-    notes = ["modal amplitude, harmonics, power and MAC cannot be had from fundamentals at one point alone"]
+    notes = ["modal amplitude, harmonics, power and MAC cannot be computed from the fundamentals of one point alone"]
     if left_out:
         notes.append(f"{left_out} of {count} levels left out: not response-controlled")
     notes += [f"left out: {why}" for why in refusals]
@@ -229,7 +229,7 @@ def _notes(
         turned = max(abs(math.degrees(fit.beta)) for _, fit in fitted)
         notes.append(
             f"the modal constant turns by up to {turned:.1f} deg: phase resonance lies up to {100.0 * apart:.2f} % from the "
-            "modal frequency, which its standard error says nothing of"
+            "modal frequency, which its standard error does not include"
         )
     for level, fit in fitted:
         if not level.frequency_hz.min() <= fit.omega / (2.0 * np.pi) <= level.frequency_hz.max():

@@ -106,15 +106,15 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
         return "switch"
     if request.unseen:
         raise NotArmed(
-            f"bench {bench.name}: something physical would move and nobody has seen that {'; '.join(request.unseen)}; run at a "
-            "terminal without `arm` and type the bench's name, or ask with a callable (arm=ask from Python)"
+            f"bench {bench.name}: a physical rig would move, and nobody has confirmed this: {'; '.join(request.unseen)}; run "
+            "at a terminal without `arm` and type the bench's name, or ask with a callable (arm=ask from Python)"
         )
     NotArmed.raise_if(request.unguarded and (arm or bench.arming.automated), request.unguarded_refusal)
     against = f" ({'; '.join(request.cautions)})" if request.cautions else ""
     switch = "" if request.unguarded else ", or give `arm`"
     automated = "" if bench.arming.automated else ", or [arming] automated = true in a bench made for it"
     raise NotArmed(
-        f"bench {bench.name}: something physical would move and nobody has armed it{against}; run on a terminal and type the "
+        f"bench {bench.name}: a physical rig would move, and the bench is not armed{against}; run on a terminal and type the "
         f"bench's name{switch}{automated}"
     )
 
@@ -137,7 +137,7 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[
     if age_h < 0.0:
         out.append(f"the last check lies {-age_h:.1f} h ahead of the clock of this computer, so its age is not known")
     if age_h > bench.arming.check_valid_h:
-        out.append(f"the last check is {age_h:.1f} h old, it counts for {bench.arming.check_valid_h:g} h")
+        out.append(f"the last check is {age_h:.1f} h old and is valid for {bench.arming.check_valid_h:g} h")
     if identity is not None and check.fingerprint != fingerprint(bench, identity):
         out.append("the last check was of other channels, another rate, another driver or another device")
     return tuple(out)

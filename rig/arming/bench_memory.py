@@ -122,12 +122,12 @@ def known_scale(
     elif check.fingerprint != fingerprint(bench, identity):
         why = "the last check was of other channels, another rate, another driver or another device"
     elif check.scale is None:
-        why = "the last check kept no numbers of it"
+        why = "the last check did not record it"
     else:
         return check.scale, ""
     return None, (
-        f"the scale of force and motion is unproven: {why}; a sensitivity that is wrong by a factor would not be seen "
-        "(run `rig check` with this bench)"
+        f"the scale of force and motion has not been checked: {why}; a sensitivity that is wrong by a factor would go "
+        "unnoticed (run `rig check` with this bench)"
     )
 
 

@@ -70,7 +70,7 @@ def _against(plan: BaseModel, bench: Bench, rehearsed: Rehearsed | None) -> str:
     if rehearsed is None:
         if largest is None:
             return ""
-        return f"arms only what was rehearsed, with a trip below {100.0 * largest:g} %: rig rehearse, then `rehearsal`"
+        return f"arms only plans rehearsed with a trip probability below {100.0 * largest:g} %: rig rehearse, then `rehearsal`"
     if rehearsed.tests != subject_digest(plan, bench):
         return f"`rehearsal` = {rehearsed.file}: is of another plan or another bench"
     if largest is None:
@@ -82,7 +82,5 @@ def _against(plan: BaseModel, bench: Bench, rehearsed: Rehearsed | None) -> str:
         )
     age_h = (datetime.now(UTC) - datetime.fromisoformat(rehearsed.finished)).total_seconds() / 3600.0
     if age_h > bench.arming.rehearsal_valid_h:
-        return (
-            f"`rehearsal` = {rehearsed.file}: is {age_h:.1f} h old, it counts for {bench.arming.rehearsal_valid_h:g} h"
-        )
+        return f"`rehearsal` = {rehearsed.file}: is {age_h:.1f} h old and is valid for {bench.arming.rehearsal_valid_h:g} h"
     return ""

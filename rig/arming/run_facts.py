@@ -69,6 +69,6 @@ def unproven_phase(bench: Bench, *, virtual: bool) -> str:
         return ""
     drive = bench.channels[bench.index_of("drive")].name
     return (
-        f"the phase of {drive} is unproven: the bench has no response with a mode_shape to compare it with, so a delay of its "
-        "conditioner would not be seen"
+        f"the phase of {drive} cannot be checked: the bench has no response with a mode_shape to compare it with, so a delay "
+        "of its conditioner would go unnoticed"
     )

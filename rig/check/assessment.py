@@ -94,7 +94,7 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
         if old is not None:
             findings += reference_findings(bench, found, old, dead)
     if reference is None:
-        text = "no reference was given: drive polarity, volts to newtons and slow changes are not seen"
+        text = "no reference was given: drive polarity, volts to newtons and slow changes are not checked"
         findings.append(not_tested("reference", text))
     level = plan.levels_rms_v[-1] if found is not None else None
     if level is not None:
@@ -144,8 +144,8 @@ def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> 
     part = recording.parts[-1]
     peak_v = float(np.abs(part.rows("output_v")).max(initial=0.0))
     text = (
-        f"played were up to {peak_v:.2g} V of the {bench.limits.voltage_v:g} V allowed; amplifier and shaker that clip "
-        "above lower the force purity of a run's points"
+        f"played were up to {peak_v:.2g} V of the {bench.limits.voltage_v:g} V allowed; an amplifier or shaker "
+        "that clips above that lowers the force purity of a run's points"
     )
     return [Finding("clipping", "", "not tested", peak_v, "V", f"up to {bench.limits.voltage_v:g}", text)]
 

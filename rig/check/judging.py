@@ -121,7 +121,7 @@ def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Find
         return []
     bad = value > MAX_DISTORTION
     text = (
-        "lines are heard that were not played: amplifier clipping, a rattle, or a very nonlinear specimen"
+        "there is a response at lines that were not excited: amplifier clipping, a rattle, or a very nonlinear specimen"
         if bad
         else ""
     )
@@ -149,7 +149,7 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
     drive_shape = bench.specimen.drive_mode_shape
     names, channels = list(responses.names), bench.channels
     if drive_shape is None:
-        return [not_tested("place", "the bench knows no drive_mode_shape: a reference check would tell")]
+        return [not_tested("place", "the bench has no drive_mode_shape to compare with; a reference check would do")]
     shapes = {
         i: drive_shape if channels[i].role == "drive" else shape
         for i in alive
@@ -160,7 +160,7 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
     expected = drive_shape * np.array([shapes[i] or 0.0 for i in known])
     volts = np.array([abs(channels[i].sensitivity_v_per_unit) for i in known])
     swapped = best_assignment(by_magnitude(np.abs(residues) * volts, np.abs(expected) * volts))
-    text = "the bench knows no mode_shape of it: a reference check would tell"
+    text = "the bench has no mode_shape of it to compare with; a reference check would do"
     out = [not_tested("place", text, names[i]) for i in alive if i not in known]
     names = [names[i] for i in known]
     if swapped is not None:
@@ -196,7 +196,7 @@ def _misplaced(names: Sequence[str], swapped: tuple[int, ...]) -> list[Finding]:
 
 
 def _look_alike(names: Sequence[str], expected: Float) -> list[Finding]:
-    text = "moves like {other} in this mode: whether the two are swapped, only a reference check tells"
+    text = "moves like {other} in this mode: only a reference check can show whether the two are swapped"
     return [
         not_tested("place", text.format(other=names[i]), names[j])
         for i, j in combinations(range(len(names)), 2)

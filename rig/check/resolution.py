@@ -42,7 +42,7 @@ def resolution_findings(bench: Bench, level_rms_v: float, rows: NDArray[np.void]
 
 def _more_gain(steps: float) -> str:
     if steps < 1.0 / ENOUGH_STEPS:
-        return "it hardly shows, so nothing tells how much gain would do, if the channel is not dead"
+        return "it hardly shows, so the gain it needs cannot be estimated, or the channel is dead"
     return f"{ENOUGH_STEPS / steps:.2g} times the gain of its conditioner, {_more_bits(steps)}"
 
 

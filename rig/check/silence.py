@@ -23,7 +23,7 @@ def silent_findings(bench: Bench, readings: Float) -> list[Finding]:
     for index, channel in enumerate(bench.channels):
         values = readings[:, index].astype(float)
         if not np.isfinite(values).all():
-            text = "samples were lost or are no numbers; see the wire"
+            text = "samples were lost or are not numbers; see the wire"
             out.append(Finding("samples", channel.name, "warn", text=text))
             values = values[np.isfinite(values)]
         stopping = bench.emergency_stop is not None and bench.emergency_stop.channel == channel.name
@@ -59,7 +59,7 @@ def _noise(channel: Channel, values: Float) -> Finding:
         text = "does not change at all: cable, supply or sensor may be dead"
     elif np.ptp(values) < 0.5 * bit:
         verdict, allowed = "ok", f"up to {MAX_NOISE * expected:.3g}"
-        text = "below one bit, as the bench expects; whether it lives is told under drive"
+        text = "below one bit, as the bench expects; whether it works is tested under drive"
     elif channel.noise_rms == 0.0 and found > MAX_NOISE * expected:
         verdict, allowed, text = "not tested", "", "the bench declares no noise_rms to compare with"
     elif found < MIN_NOISE * channel.noise_rms and channel.noise_rms > bit:

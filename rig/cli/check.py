@@ -23,7 +23,7 @@ def check_(
     reference: Annotated[Path | None, typer.Option(help="Recording of an earlier check to compare with.")] = None,
     level_rms_v: Annotated[
         float | None,
-        typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found by itself if left out."),
+        typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found automatically if left out."),
     ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf, .svg or .html.")] = None,
     options: "RunOptions",

@@ -22,7 +22,7 @@ class IdentifyGroup(KindGroup):
     after = (
         "Files are recordings or imported measurements, taken together. All kinds have -o, --overwrite (replace OUTPUT) and "
         "--json (print JSON); `rig identify KIND --help` shows the others. Without KIND it is nonlinear-mode, or that of "
-        "--model; a file that is called like a kind is written ./pnlss."
+        "--model; a file with the name of a kind is written ./pnlss."
     )
     files = parameter(
         "files", Annotated[list[Path], typer.Argument(help="Recordings, or imported measurements, taken together.")]

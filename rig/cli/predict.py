@@ -20,7 +20,7 @@ class PredictGroup(KindGroup):
     usage = "[KIND] FILE -o OUTPUT [OPTIONS]"
     after = (
         "All kinds have -o, --overwrite (replace OUTPUT) and --json (print JSON); `rig predict KIND --help` shows the others. "
-        "Without KIND it is that of the model in FILE; a file that is called like a kind is written ./pnlss."
+        "Without KIND it is that of the model in FILE; a file with the name of a kind is written ./pnlss."
     )
     files = parameter("model", Annotated[Path, typer.Argument(help="Model of one of the kinds that predict.")])
 

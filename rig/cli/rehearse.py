@@ -239,4 +239,4 @@ def print_comparison(found: "Comparison") -> None:
     for text in found.findings:
         print(f"FINDING {text}")
     if not found.findings:
-        print("the run lies within what was foreseen")
+        print("the run lies within the forecast")

@@ -34,7 +34,7 @@ def plot_(
     ] = "screen",
     size: Annotated[str, typer.Option(metavar="WxH", help="Width and height, mm, or the width alone.")] = "",
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace OUTPUT also where it is no figure of ours.")
+        bool, typer.Option("--overwrite", help="Replace OUTPUT also where it is not a figure of this program.")
     ] = False,
 ) -> None:
     """Draw what is in a file; of several files, or with axes of one's own, their curves over one another."""

@@ -23,7 +23,7 @@ def tune_(
     output: Annotated[Path, typer.Option("-o", "--output", help="Plan to write: a TOML file.")],
     level_rms_v: Annotated[
         float | None,
-        typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found by itself if left out."),
+        typer.Option("--level", metavar="V", help="RMS voltage of the multisine; found automatically if left out."),
     ] = None,
     law: Annotated[
         str, typer.Option(help="frequency-error (levels in metres) or phase (levels in volts).")

@@ -104,7 +104,7 @@ class ContinuingTests(LoopbackSteps, OutputSteps):
             f"{seen:g} V are on the output, {1.5 * watchdog_s:g} s after the last one was handed over: the watchdog has "
             f"{watchdog_s:g} s"
         )
-        assert told, f"nobody said that the watchdog of {watchdog_s:g} s had bitten"
+        assert told, f"the driver did not report that the watchdog of {watchdog_s:g} s had bitten"
         with self.make_visible() as daq:
             daq.clear()  # what this test has made latch
 

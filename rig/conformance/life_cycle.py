@@ -143,12 +143,12 @@ class LifeCycleTests(DriverUnderTest):
         """Identity in text, statistics in numbers, remarks in lines, all known once open."""
         with self.make() as daq:
             for name, value in daq.identity.items():
-                assert isinstance(name, str), f"identity: {name!r} is no text"
-                assert isinstance(value, str), f"identity: {name} = {value!r} is no text"
+                assert isinstance(name, str), f"identity: {name!r} is not text"
+                assert isinstance(value, str), f"identity: {name} = {value!r} is not text"
             for name, number in daq.statistics.items():
                 assert isinstance(number, int | float), f"statistics: {name} = {number!r} is no number"
             for remark in daq.remarks:
-                assert isinstance(remark, str), f"remarks: {remark!r} is no text"
+                assert isinstance(remark, str), f"remarks: {remark!r} is not text"
                 assert "\n" not in remark, f"remarks: {remark!r} is more than one line"
 
     def test_capabilities_are_the_same_before_and_while_running(self) -> None:

@@ -14,7 +14,7 @@ from rig.errors import DaqError
 STILL = 0.1  # of the amplitude: an output below it counts as 0 V
 POLL_S = 0.02  # s between two looks at the witness; chosen
 UNSEEN = (
-    "nobody sees the output: connect it to a channel with loopback = true, or override witness (voltmeter, second DAQ)"
+    "nothing sees the output: connect it to a channel with loopback = true, or override witness (voltmeter, second DAQ)"
 )
 BLIND = (
     "the loopback shows nothing that the output was left with: the device puts out its first new output, or 0 V, before it "

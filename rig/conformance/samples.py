@@ -218,7 +218,7 @@ class SamplesTests(DriverUnderTest):
             for _ in range(20):
                 daq.exchange(np.zeros(daq.block))
             for name, count in daq.counters.items():
-                assert isinstance(count, int), f"counters: {name} = {count!r} is no whole number"
+                assert isinstance(count, int), f"counters: {name} = {count!r} is not a whole number"
                 assert count >= before.get(name, 0), f"counters: {name} was {before[name]} and is {count}"
 
 

@@ -85,7 +85,7 @@ class WaysOutTests(OutputSteps):
                     failed = True
                 daq.exchange_zeros()
                 daq.stop()
-            assert failed, "an exception inside the driver is no DaqError"
+            assert failed, "an exception inside the driver is not a DaqError"
             seen = self.look(daq)
         self.require_still(seen, "after an exception and stop", "_stop")
 

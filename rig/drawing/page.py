@@ -42,7 +42,7 @@ def check_ending(figure: Path) -> None:
 
 
 def check_replaceable(figure: Path) -> None:
-    """Raise `RecordingError` for a file that exists and is no figure of this program."""
+    """Raise `RecordingError` for a file that exists and is not a figure of this program."""
     suffix = figure.suffix.lower()
     mark = MARK.encode() if suffix == _HTML else _MARKS[suffix][1]
     try:
@@ -51,7 +51,7 @@ def check_replaceable(figure: Path) -> None:
         raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
     if not ours:
         raise RecordingError(
-            f"{figure}: exists already and is no figure of this program; choose another name, or --overwrite"
+            f"{figure}: exists already and is not a figure of this program; choose another name, or --overwrite"
         )
 
 

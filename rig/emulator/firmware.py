@@ -106,7 +106,7 @@ class Firmware:
         said = _text(self.child.stderr) or "it said nothing"
         if self.child.returncode == BAD_DESCRIPTION:
             return ConfigurationError(f"refuses to be this device: {said}", field="firmware")
-        return DaqDisconnected(f"firmware: the program has ended by itself, status {self.child.returncode}: {said}")
+        return DaqDisconnected(f"firmware: the program has ended, status {self.child.returncode}: {said}")
 
     def end(self) -> dict[str, int]:
         """Tell it to end; what it has counted."""

@@ -173,14 +173,14 @@ def check_log(path: Path) -> None:
         raise ConfigurationError(f"cannot be written: {error.strerror}", field="log_output", value=str(path)) from error
     if start and not _LOGGED.match(start):
         raise ConfigurationError(
-            "exists already and is no log of an emulator; choose another name", field="log_output", value=str(path)
+            "exists already and is not a log of an emulator; choose another name", field="log_output", value=str(path)
         )
 
 
 class OutputLog:
     """A log of the output: a line has the time of ``time.monotonic`` in s, a sample, and the largest absolute output in V.
 
-    A file that cannot be made, or that exists and is no such log, is a `ConfigurationError`; a disk that is full later ends
+    A file that cannot be made, or that exists and is not such a log, is a `ConfigurationError`; a disk that is full later ends
     the writing and nothing else.
     """
 

@@ -25,10 +25,10 @@ def series_in(path: Path) -> FileData:
     try:
         series = json.loads(read_text(path, _LARGEST_JSON_BYTES, ImportFailed))
     except (ValueError, RecursionError) as error:
-        raise ImportFailed(f"{path}: is no JSON ({error})") from None
+        raise ImportFailed(f"{path}: is not JSON ({error})") from None
     if not isinstance(series, list) or not all(isinstance(one, Mapping) for one in series):
         raise ImportFailed(
-            f"{path}: is no list of SEP005 time series, dictionaries with data, name, unit_str, fs or time"
+            f"{path}: is not a list of SEP005 time series, dictionaries with data, name, unit_str, fs or time"
         )
     return data_of_series(series)
 

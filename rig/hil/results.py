@@ -18,7 +18,9 @@ class Results:
     def __init__(self, path: str) -> None:
         self._path = Path(path).absolute()
         if self._path.exists() and not _is_result(self._path):
-            raise pytest.UsageError(f"--rig-result {path}: exists already and is no such result; choose another name")
+            raise pytest.UsageError(
+                f"--rig-result {path}: exists already and is not such a result; choose another name"
+            )
         self._subject: dict[str, object] = {}
         self._started = datetime.now(UTC).isoformat(timespec="seconds")
         self._tests: dict[str, dict[str, Any]] = {}

@@ -56,7 +56,7 @@ class LiveRun(Closing):
             self._frames, self._traces = _mapped(folder / FRAME_FILE), _mapped(folder / TRACES)
             self._file = (folder / LINES).open("rb")
         except (OSError, ValueError) as error:
-            raise RecordingError(f"{folder}: is no run under way ({error})") from error
+            raise RecordingError(f"{folder}: is not a run under way ({error})") from error
         if len(self._traces) != HEAD + BINS * self._bin.itemsize:
             self.close()
             raise RecordingError(f"{folder}: was published by another version of this program")

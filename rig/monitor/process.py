@@ -96,7 +96,7 @@ class Address:
             listening = socket.socket(family, kind, protocol)
         except (OSError, UnicodeError) as error:
             raise ConfigurationError(
-                f"is no address of this machine ({error})", field="bind", value=self.bind
+                f"is not an address of this machine ({error})", field="bind", value=self.bind
             ) from error
         try:
             if os.name == "posix":  # a port that was closed just now may be used again; elsewhere this means any port

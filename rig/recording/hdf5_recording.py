@@ -155,7 +155,7 @@ def read_recording(file: "h5py.File", path: Path) -> tuple[Header, list[StoredPa
     """
     with reading(path):
         if "parts" not in file:
-            raise RecordingError(f"{path}: is no recording but a file of kind {kind_in(file)!r}")
+            raise RecordingError(f"{path}: is not a recording but a file of kind {kind_in(file)!r}")
         texts = StoredTexts(path.stat().st_size)
         parts = [StoredPart(file["parts"][str(number)], texts, path) for number in range(len(file["parts"]))]
         header = Header(

@@ -110,7 +110,7 @@ class JournalBlocks:
         elif not copy and (block.kind is BlockKind.HEADER or last.kind in (BlockKind.HEADER, BlockKind.END)):
             raise BadBlockError(f"a block of kind {block.kind.name.lower()} outside any part")
         if block.kind is BlockKind.ROWS and len(block.payload) % self.header.row_dtype.itemsize:
-            raise BadBlockError(f"{len(block.payload)} bytes are no whole number of rows")
+            raise BadBlockError(f"{len(block.payload)} bytes are not a whole number of rows")
         if block.version == 1:
             return replace(block, part=part, row=row)
         if (block.part, block.row) != (part, row):

@@ -85,7 +85,8 @@ def compare(forecast: Forecast, points: Iterable[Point[object]], end: Mapping[st
     findings = [f"point {one.number + 1}: {text}" for one in found for text in one.findings]
     if end is not None and end["tripped"] and forecast.trips <= 1.0 - LIKELY:
         findings.insert(
-            0, f"the run tripped ({end['text']}); foreseen was a trip in {100.0 * forecast.trips:.2g} % of the draws"
+            0,
+            f"the run tripped ({end['text']}); the forecast was a trip in {100.0 * forecast.trips:.2g} % of the draws",
         )
     return Comparison(found, tuple(findings))
 

@@ -85,7 +85,7 @@ def not_computed_in_one_line(verdict: Verdict) -> str:
     why = "; ".join(f"{count} x {text}" for text, count in list(verdict.why_not_computed.items())[:MAX_REASONS])
     out = f"{missing.count} of {missing.of} twins could not be computed ({why}), all shares are of the others"
     if missing.value > RELIABLE_MISSING:
-        out += "; these are too many to rely on the verdict: tell more of the rig (--from), or narrower hypotheses"
+        out += "; these are too many to rely on the verdict: give more measurements of the rig (--from) or narrower hypotheses"
     return out
 
 

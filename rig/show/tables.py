@@ -160,8 +160,8 @@ def _print_mode_shape(shape: dict[str, Any] | None) -> None:
     print(shape["text"])
     if shape["others"]:
         print(
-            f"evaluated with that of an earlier plan: {', '.join(map(point_name, shape['others']))}; a model takes the above "
-            "for all points"
+            f"evaluated with the value of an earlier plan: {', '.join(map(point_name, shape['others']))}; a model takes the "
+            "above for all points"
         )
 
 
@@ -198,7 +198,7 @@ def print_rehearsal(rehearsal: Mapping[str, Any] | None, beside: Mapping[str, An
     for finding in (beside or {}).get("findings", ()):
         print(f"  FINDING {finding}")
     if beside is not None and not beside["findings"]:
-        print("  the run lies within what was foreseen")
+        print("  the run lies within the forecast")
 
 
 def print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:

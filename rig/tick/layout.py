@@ -56,7 +56,7 @@ ROW_COLUMNS: tuple[dict[str, str], ...] = (
 """Unit and meaning of every recorded column, for the file."""
 
 SATURATED = 1  # flag: the output stood at its limit
-FREQUENCY_CLAMPED = 2  # flag: the frequency stood at an end of its window
+FREQUENCY_CLAMPED = 2  # flag: the frequency was at an end of its window
 SENSOR_AT_RANGE = 4  # flag: an input was near its range
 HELD = 8  # flag: a law held its level
 DEVICE_SHIFT = 16  # bits by which the flags of the device are shifted

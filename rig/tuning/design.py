@@ -131,9 +131,9 @@ def choose(
         closed_form=hippold_gains(plant, w),
         slopes=best.slopes,
         outside=_beyond(best.loop, responses),
-        why=f"w_LP = w0/{omega / w:.3g} ({noise}), k = w_LP/{1 / share:.0f}, K = w_LP/{1 / best.response_share:.3g}: of those "
-        f"tried whose max |S| is at most {MAX_SENSITIVITY:g} with the damping measured, {OTHER_SENSITIVITY:g} with up to "
-        f"{DAMPINGS[-1]:g} times that, the quickest of those that bear the steepest softening and hardening",
+        why=f"w_LP = w0/{omega / w:.3g} ({noise}), k = w_LP/{1 / share:.0f}, K = w_LP/{1 / best.response_share:.3g}: the "
+        f"fastest stable gains that tolerate the frequency changes under *slopes* (max |S| at most {MAX_SENSITIVITY:g} with "
+        f"the damping measured, {OTHER_SENSITIVITY:g} with up to {DAMPINGS[-1]:g} times that)",
     )
 
 

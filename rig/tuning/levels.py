@@ -43,7 +43,7 @@ def low_pass(
         )
     why = f"the lag then fluctuates by {LAG_STD_DEG:g} deg at"
     if needed_n <= min(RAISED * lowest_n, highest_n / MIN_SPAN):
-        return quickest.low_pass_rad_s, needed_n, f"{why} {needed_n:.3g} N, the lowest level, raised for that"
+        return quickest.low_pass_rad_s, needed_n, f"{why} {needed_n:.3g} N, the lowest level, raised for this"
     choice = fluctuation(lowest_n)
     force_n = lowest_n * max(1.0, choice.lag_std_deg / LAG_STD_DEG)
     return choice.low_pass_rad_s, force_n, f"{why} {force_n:.3g} N, the lowest level"

@@ -65,7 +65,7 @@ def plan_text(
     ]
     if levels.accepted_nonharmonic is not None:
         head += [
-            "# Rounding of the output: lines away from the harmonics, which leave frequency and damping as they are.",
+            "# Rounding of the output: lines away from the harmonics, which do not change frequency and damping.",
             _line("accepted_nonharmonic_force", significant(levels.accepted_nonharmonic, 2)),
         ]
     controller = [
@@ -80,7 +80,7 @@ def plan_text(
         *_comment(f"Resonance of the structure alone as measured; {window.why}."),
         _line("centre_frequency_hz", significant(hertz, 6)),
         _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),
-        "# A lock counts as lost where twice the time in which the frequency follows has not brought it back.",
+        "# A lock counts as lost if it has not returned within twice the time in which the frequency follows.",
         f"lock = {{ lost_periods = {lost_periods}, waiting_deg = {WAITING_DEG:g} }}",
     ]
     controller += [] if harmonics is None else _harmonics(harmonics)
@@ -143,8 +143,8 @@ COMMENTS = {
     "frequency_integral_per_s": "Part of the low-pass, see above.",
     "response_integral_per_s": "Part of the low-pass, see above.",
     "plant_pole_rad_s": "Coupled pole less i times the resonance, as measured: the response loop cancels it.",
-    "reference_integral_per_s": "For levels in newtons: as quick as the measured damping lets a force be held.",
-    "drive_mode_shape": "As measured here, not the bench's.",
+    "reference_integral_per_s": "For levels in newtons: as fast as the measured damping allows.",
+    "drive_mode_shape": "As measured here, not from the bench.",
 }
 
 
@@ -154,7 +154,7 @@ def _gains(chosen: Chosen) -> list[str]:
         if key in COMMENTS:
             out.append(f"# {COMMENTS[key]}")
         if key == "plant_pole_rad_s" and chosen.cancels != 1.0:
-            out.append("# Not quite: another proportional gain than the one that cancels it bears more hardening.")
+            out.append("# Not exactly: a proportional gain other than the cancelling one tolerates more hardening.")
         out.append(_line(key, [significant(v) for v in value] if isinstance(value, tuple) else significant(value)))
     return out
 

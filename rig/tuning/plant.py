@@ -237,7 +237,7 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
         text = (
             f"specimen.drive_mode_shape = {facts.drive_mode_shape:g} kg^-1/2 of the bench is {ratio:.2f} times the measured "
             f"{plant.drive_shape:.4g}: the plan uses the measured one, for control and for damping; with the bench's the "
-            f"damping would be read {ratio**2:.2f} times as large"
+            f"damping would come out {ratio**2:.2f} times as large"
         )
         if max(ratio, 1.0 / ratio) > MAX_SHAPE_FACTOR:
             text += f"; a frequency-error loop tolerates a factor of {MAX_SHAPE_FACTOR:g}"

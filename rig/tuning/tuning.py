@@ -223,7 +223,7 @@ def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> list[str]:
     limit, highest = bench.limits.voltage_v, levels.needed_v[-1]
     if highest > LIMIT_FRACTION * limit * 1.001:
         out.append(
-            f"the highest level needs {highest:.3g} of {limit:g} V on the linear plant: it is out of reach where the damping "
+            f"the highest level needs {highest:.3g} of {limit:g} V on the linear plant: it is out of reach if the damping "
             f"rises beyond {limit / highest:.2g} times that of the multisine"
         )
     return out

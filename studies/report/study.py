@@ -46,7 +46,7 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         found = json.loads(read_text(path, _LARGEST_BYTES, RecordingError))
     except (ValueError, RecursionError) as error:
-        raise RecordingError(f"{path}: damaged: is no JSON ({error})") from None
+        raise RecordingError(f"{path}: damaged: is not JSON ({error})") from None
     if not isinstance(found, dict):
         raise RecordingError(f"{path}: damaged: holds no table")
     return found

@@ -287,7 +287,7 @@ def test_a_knock_that_only_the_evaluation_sees_is_measured_again_after_the_last_
         assert recording.parts[1].end["skipped"] == ""
     assert first.part == 1
     (attempt,) = first.refused_before
-    assert "are no harmonics" in attempt.reason
+    assert "is not harmonic" in attempt.reason
     assert attempt.part == 0
     assert attempt.frequency_hz == pytest.approx(first.vibration.frequency_hz, rel=1e-4)
     assert second.part == 0

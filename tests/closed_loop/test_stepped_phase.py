@@ -73,6 +73,6 @@ def test_a_force_that_is_mostly_another_mode_is_no_point():
     assert not any(point["accepted"] for point in lost)  # the paper's force loop does not hold there
     swinging = [point for point in points if point.get("nonharmonic_force", 0.0) > 0.3]
     assert swinging
-    assert all("no harmonics" in point["reason"] for point in swinging)
+    assert all("not harmonic" in point["reason"] for point in swinging)
     assert points[-1]["accepted"]
     assert points[-1]["frequency_hz"] == pytest.approx(truth.frequency_hz[0], rel=1e-3)

@@ -89,7 +89,7 @@ def test_frames_that_a_bus_loses_are_gaps_that_are_counted_and_leave_the_point_r
         assert counters["lost_samples"] == pytest.approx(dropped * BLOCKS["shipped"], abs=BLOCKS["shipped"])
         for point, wanted in zip(run.recording.points, without_wire["shipped"], strict=True):
             assert point["accepted"]
-            assert any("lost on their way" in warning for warning in point["warnings"])
+            assert any("lost in transmission" in warning for warning in point["warnings"])
             rows = point_rows(run.recording, point["number"])
             lost = lost_rows(rows)
             assert point["lost_samples"] == lost.sum() > 0

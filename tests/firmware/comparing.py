@@ -111,7 +111,7 @@ def differences(python: PythonDevice, firmware_sent: Sequence[Event]) -> list[Di
     try:
         theirs = sort_out(python.choice, firmware_sent, sizes)
     except (AssertionError, Malformed) as error:
-        return [Difference("what the firmware says is no message", 0, "", repr(error))]
+        return [Difference("what the firmware says is not a message", 0, "", repr(error))]
     out = [
         *_differences_of("answer", ours.answers, theirs.answers),
         *_differences_of("heartbeat", ours.heartbeats, theirs.heartbeats),

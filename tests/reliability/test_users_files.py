@@ -107,8 +107,8 @@ def test_an_emulator_replaces_its_own_bench_log_and_link_alone(users, tmp_path):
 def test_a_figure_replaces_figures_of_this_program_alone(users, tmp_path, suffix, command):
     recording = recorded("magnet-beam/backbone-short")
     photo = users(f"photo{suffix}")
-    assert "no figure of this program" in command(f"plot {recording} -o {photo}").err
-    assert "no figure of this program" in command(f"analyse modes --bench magnet-beam -o {photo}").err
+    assert "not a figure of this program" in command(f"plot {recording} -o {photo}").err
+    assert "not a figure of this program" in command(f"analyse modes --bench magnet-beam -o {photo}").err
     ours = tmp_path / f"ours{suffix}"
     for _ in range(2):
         with page_for(ours, (2.0, 2.0)):

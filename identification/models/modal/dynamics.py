@@ -147,7 +147,7 @@ def drawn_modes(mode: NonlinearMode, count: int, seed: int) -> Iterator[Nonlinea
     """Yield ``count`` draws of the mode; raise `IdentificationError` if a level has no standard error."""
     for name in ("modal_frequency_std_hz", "damping_ratio_std"):
         if not np.all(np.isfinite(getattr(mode, name))):
-            raise IdentificationError("unknown at some level, the band cannot be had without it", field=name)
+            raise IdentificationError("unknown at some level, the band needs it", field=name)
     random = np.random.default_rng(seed)
     for _ in range(count):
         yield _drawn(mode, random)

@@ -55,7 +55,7 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
             best = found
     if best is None:
         raise IdentificationError(
-            f"{states} cannot be had of these responses ({refused})", field="states", hint="ask for fewer"
+            f"{states} cannot be identified from these responses ({refused})", field="states", hint="ask for fewer"
         )
     return fit_state_space(responses, best.model, sample_rate_hz=sample_rate_hz, weighting="relative")
 
@@ -166,7 +166,9 @@ def linear_pnlss(
     model = with_independent_states(model, moved)
     seen = np.diag(_observability(model, moved))
     hardly = int(np.count_nonzero(seen < _HARDLY**2 * np.max(seen)))
-    more = f"states: {hardly} of {states} hardly move the outputs of the linear model; {states - hardly} may do"
+    more = (
+        f"states: {hardly} of {states} hardly affect the outputs of the linear model; {states - hardly} may be enough"
+    )
     m = len(first.input_channels)
     b, d = np.zeros((states, m)), np.zeros((len(first.output_channels), m))
     b[:, varying], d[:, varying] = model.b, model.d

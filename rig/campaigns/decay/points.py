@@ -123,8 +123,8 @@ def _decay_of(bench: Bench, plan: DecayPlan, rows: np.ndarray) -> DecayBackbone:
     mode = replace(mode, time_s=mode.time_s - start_s, start_s=mode.start_s - start_s, stop_s=mode.stop_s - start_s)
     ratio = float(np.median(mode.decay_ratio / mode.damping_ratio))
     note = (
-        f"the vibration decayed {ratio:.3g} times as fast as without the exciter, whose part was taken out through the "
-        f"measured force: 1 % more of drive_mode_shape, or 2 % more gain of the force against the motion, changes the "
+        f"the vibration decayed {ratio:.3g} times as fast as without the exciter, whose contribution was removed using "
+        f"the measured force: 1 % more of drive_mode_shape, or 2 % more gain of the force against the motion, changes the "
         f"damping by {2.0 * abs(ratio - 1.0):.2g} %"
     )
     return DecayBackbone(modes=(mode,), channels=channels_of(bench), specimen=bench.specimen.name, notes=(note,))

@@ -59,13 +59,13 @@ def nonharmonic_objection(nonharmonic: float, accepted: float, output_bits: floa
     """
     if not nonharmonic > accepted:
         return ""
-    cause = "another mode, or a loop that swings"
+    cause = "another mode, or a loop that oscillates"
     if output_bits < FEW_OUTPUT_BITS:
         cause = (
             f"the output has an amplitude of {output_bits:.3g} steps of its converter, whose rounding is amplified off "
             f"resonance (less gain behind the converter, or a higher level, helps); else {cause}"
         )
-    return f"{100.0 * nonharmonic:.1f} % of the force's RMS are no harmonics, accepted up to {100.0 * accepted:g} %: {cause}"
+    return f"{100.0 * nonharmonic:.1f} % of the force's RMS is not harmonic, accepted up to {100.0 * accepted:g} %: {cause}"
 
 
 def hunting_objection(scatter: float, accepted: float) -> str:

@@ -68,13 +68,13 @@ def misfit_sentence(misfits: Sequence[Misfit], drive: str) -> str:
     worst = max(misfits, key=lambda misfit: (misfit.warned, misfit.factor, bool(misfit.swapped_with)))
     if worst.swapped_with:
         return (
-            f"channel {worst.channel} and channel {worst.swapped_with} seem swapped, for the sizes fit the mode shapes with "
-            "these two exchanged: look at both cables"
+            f"channel {worst.channel} and channel {worst.swapped_with} seem swapped: the amplitudes fit the mode shapes with "
+            "these two exchanged; look at both cables"
         )
     limit = f"{REFUSED_DEG if worst.refused else WARNED_DEG:g} deg"
     if worst.turn_deg is None:
         limit = f"a factor {REFUSED if worst.refused else worst.trusted:g}"
-    bound = f"refused from {limit}" if worst.refused else f"trusted up to {limit}"
+    bound = f"refused from {limit}" if worst.refused else f"warning above {limit}"
     alike = [
         one
         for one in misfits
@@ -85,7 +85,7 @@ def misfit_sentence(misfits: Sequence[Misfit], drive: str) -> str:
         names = ", ".join(misfit.channel for misfit in off)
         if worst.turn_deg is not None:
             return (
-                f"channel {drive}: all others ({names}) stand {_turn(worst.turn_deg)} it, expected 0 {worst.by.value}, "
+                f"channel {drive}: all others ({names}) are {_turn(worst.turn_deg)} it, expected 0 {worst.by.value}, "
                 f"{bound}: look at what delays or advances its sensor (conditioner, filter, skew_samples)"
             )
         return (
@@ -109,7 +109,7 @@ def _turn(turn_deg: float) -> str:
 
 def _what_was_seen(misfit: Misfit) -> str:
     if misfit.turn_deg is not None:
-        return f"channel {misfit.channel} stands {_turn(misfit.turn_deg)} the drive channel, expected 0"
+        return f"channel {misfit.channel} is {_turn(misfit.turn_deg)} the drive channel, expected 0"
     if misfit.by is Reference.NOT_TRUSTED:
         return f"channel {misfit.channel}: force over velocity at the drive point is like that at {misfit.at},"
     if misfit.at:

@@ -7,7 +7,7 @@ import numpy as np
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_LOST
 
 DISTURBED = "the settle rule was broken while recording"
-TOO_LATE, LOST = "outputs came too late", "samples were lost on their way"
+TOO_LATE, LOST = "outputs came too late", "samples were lost in transmission"
 REMEDY = "`rig doctor --daq` recommends a queue and block that are long enough"
 
 

@@ -21,6 +21,6 @@ def with_heavy_damping(point: Point[object]) -> Point[object]:
         return point
     shift = 2.0 * modal.damping_ratio**2
     return point.warned(
-        f"damping ratio {100.0 * modal.damping_ratio:.3g} %, trusted up to {100.0 * TRUSTED:g} %: other modes shift the phase "
-        f"resonance by {100.0 * shift:.2g} % of their share of the static compliance, which no standard error holds"
+        f"damping ratio {100.0 * modal.damping_ratio:.3g} % (warning above {100.0 * TRUSTED:g} %): other modes shift the phase "
+        f"resonance by {100.0 * shift:.2g} % of their share of the static compliance, which the standard errors do not include"
     )

@@ -28,14 +28,14 @@ def _lost_in(rows: Rows) -> np.ndarray:
 
 def lost_warnings(lost: int, size: int) -> list[str]:
     """Return one line on the number of lost samples; an empty list if none was lost."""
-    return [f"{lost} of {size} samples were lost on their way"] if lost else []
+    return [f"{lost} of {size} samples were lost in transmission"] if lost else []
 
 
 def lost_objection(lost: int, size: int) -> str:
     """Object if more than 5 % of the ``size`` samples of a record were lost."""
     if lost <= LARGEST_LOST * size:
         return ""
-    return f"{lost} of {size} samples were lost on their way, allowed is up to {LARGEST_LOST:.0%}"
+    return f"{lost} of {size} samples were lost in transmission, allowed is up to {LARGEST_LOST:.0%}"
 
 
 def windows(time_s: np.ndarray, half_s: np.ndarray, rate_hz: float, n_rows: int) -> tuple[np.ndarray, np.ndarray]:

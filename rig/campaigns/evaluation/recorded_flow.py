@@ -11,8 +11,8 @@ from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plant import PlantFacts
 from rig.tick.layout import FREQUENCY_CLAMPED, SATURATED, SENSOR_AT_RANGE
 
-AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
-SAMPLES_LOST = "samples were lost on their way"
+AT_VOLTAGE_LIMIT = "the output was at its voltage limit"
+SAMPLES_LOST = "samples were lost in transmission"
 
 HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far its window reaches to either side of an instant
 
@@ -56,7 +56,7 @@ def flagged(bench: Bench, rows: Rows, flow: SlowFlow) -> dict[str, np.ndarray]:
     out = {}
     for reason, bit in (
         (AT_VOLTAGE_LIMIT, SATURATED),
-        ("the frequency stood at an end of its window", FREQUENCY_CLAMPED),
+        ("the frequency was at an end of its window", FREQUENCY_CLAMPED),
         ("a sensor was near its range", SENSOR_AT_RANGE),
     ):
         count = np.concatenate([[0], np.cumsum((rows["flags"] & bit) != 0)])

@@ -73,7 +73,7 @@ def scale_misfit(
     factor = max(_factor(per_newton), _factor(per_volt))
     damped = not at_start and per_newton < 1.0 and _factor(per_volt) < WARNED
     allowed = REFUSED * (MORE_DAMPING if damped else 1.0)
-    bound = f"refused from a factor {allowed:g}" if factor >= allowed else f"trusted up to a factor {WARNED:g}"
+    bound = f"refused from a factor {allowed:g}" if factor >= allowed else f"warning above a factor {WARNED:g}"
     return ScaleMisfit(factor, allowed, _sentence(bench, per_newton, per_volt, bound, checked))
 
 

@@ -79,14 +79,14 @@ def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: Rows, hel
         force = bench.channels[bench.index_of("force")]
         bits = vibration.force_n / force.resolution_in_unit
         out.append(
-            f"the lag scatters by {scatter:.1f} deg: trusted up to {SCATTERING_DEG:g}; too little signal (force "
-            f"{vibration.force_n:.3g} N, {bits:.1f} steps of its converter), or too quick a detector"
+            f"the lag scatters by {scatter:.1f} deg (warning above {SCATTERING_DEG:g} deg): too little signal (force "
+            f"{vibration.force_n:.3g} N, {bits:.1f} steps of its converter), or a detector that is too fast"
         )
     linear_hz = bench.specimen.linear_frequency_hz
     if math.isfinite(scatter) and abs(vibration.frequency_hz / linear_hz - 1.0) > OTHER_MODE:
         out.append(
             f"perhaps another mode at {vibration.frequency_hz:.4g} Hz: more than {100.0 * OTHER_MODE:g} % from "
-            f"specimen.linear_frequency_hz = {linear_hz:g}, and another mode looks the same to a phase"
+            f"specimen.linear_frequency_hz = {linear_hz:g}, and the phase alone cannot tell one mode from another"
         )
     return tuple(out)
 

@@ -28,9 +28,9 @@ WHY = {
     Outcome.NOT_SETTLED: "not settled within {longest:g} periods",
     Outcome.DISTURBED: DISTURBED,
     Outcome.LOST_LOCK: "phase lock lost",
-    Outcome.UNREACHABLE: "out of reach: the output stood at its voltage limit",
-    Outcome.OUTSIDE_WINDOW: "the frequency stood at an end of its window: another mode, or a resonance outside",
-    Outcome.NOT_LOCKED: "the phase error stayed that of a lost lock",
+    Outcome.UNREACHABLE: "out of reach: the output was at its voltage limit",
+    Outcome.OUTSIDE_WINDOW: "the frequency was at an end of its window: another mode, or a resonance outside",
+    Outcome.NOT_LOCKED: "the lock was lost and did not return",
     Outcome.INTERRUPTED: "interrupted",
 }
 

@@ -67,7 +67,7 @@ def measure_multisine_point(
     still = next((name for name in (roles["force"], roles["drive"]) if not np.ptp(readings[:, names.index(name)])), "")
     change = max(_change(spectra, roles[role]) for role in ("force", "drive")) if periods > 1 else math.nan
     warnings = [f"{plan.periods - periods} of {plan.periods} periods are left out"] if periods < plan.periods else []
-    warnings += ["one period only: neither noise nor a transient can be told"] if periods == 1 else []
+    warnings += ["one period only: noise and transients cannot be estimated"] if periods == 1 else []
     reason = f"channel {still} does not change at all: sensor, cable or supply is dead" if still else ""
     if not reason and change > plan.accepted_change:
         reason = (
@@ -127,7 +127,7 @@ def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarr
     signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
     periods = signals.reshape(signals.shape[0], plan.periods, size)
     whole = ~lost_rows(rows).reshape(plan.periods, size).any(axis=1)
-    IdentificationError.raise_if(not whole.any(), "samples were lost on their way in every period", field="record")
+    IdentificationError.raise_if(not whole.any(), "samples were lost in transmission in every period", field="record")
     return np.asarray(np.roll(periods[:, whole], begun, axis=2))
 
 

@@ -47,7 +47,7 @@ class DriveShape:
     def __str__(self) -> str:
         """In words, with the 95 % interval."""
         if self.value is None:
-            return "mode shape at the drive point: none, damping needs it"
+            return "mode shape at the drive point: unknown; damping needs it"
         error = "" if self.std is None else f" +- {1.96 * self.std:.2g}"
         return f"mode shape at the drive point: {self.value:.5g}{error} kg^-1/2, {self.source}"
 

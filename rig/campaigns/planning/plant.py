@@ -127,7 +127,7 @@ def check_quickness(loops: Sequence[ControlLoop]) -> None:
     if gain > LARGEST_AT_HALF:
         hertz = loop.omega_rad_s / 2.0 / math.pi
         raise ConfigurationError(
-            f"the {name} is too quick on the known plant ([plant], {hertz:.2f} Hz)"
+            f"the {name} is too fast on the known plant ([plant], {hertz:.2f} Hz)"
             f"{lags_text([loop.lag_deg])}: its gain at {0.5 * hertz:.4g} Hz, half the locked frequency, is {gain:.3g}",
             field="controller",
             allowed=f"{LARGEST_AT_HALF:g}: demodulated signals cannot follow changes within two periods",

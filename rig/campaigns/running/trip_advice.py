@@ -116,7 +116,7 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
     if trip.reason in LIMITS:
         key = LIMITS[trip.reason]
         now = f"limits.{key} = {getattr(bench.limits, key):g}"
-        raised = f"raise {now} of the bench if specimen and rig bear it, in a run of its own"
+        raised = f"raise {now} of the bench if specimen and rig can take it, in a run of its own"
     lowered = f"lower {'start_v' if at is not None and at.start else plan.levels_key}"
     what = "the level" if at is None else f"the level {at.text}"
     if margin is None:
@@ -145,7 +145,7 @@ def _on_a_lock(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None) -> Ad
     if from_end <= NEAR_WINDOW_END * (high - low):
         return Advice(
             f"the resonance{where} lies beyond {key} = [{low:g}, {high:g}]",
-            "widen it if rig and specimen bear it, or lower the levels",
+            "widen it if rig and specimen can take it, or lower the levels",
         )
     return Advice(
         f"a lock that had been gained broke{where} at {trip.frequency_hz:.4g} Hz, within its window: a knock, a step of the "

@@ -122,7 +122,7 @@ class VirtualDAQ(DAQ):
             raise invalid(error, VirtualRig, where="driver.options") from None
         except (ArithmeticError, ValueError, MemoryError) as error:
             raise ConfigurationError(
-                f"this rig cannot be computed, a number of it is far too large or small ({error})",
+                f"this rig cannot be simulated: one of its numbers is far too large or small ({error})",
                 field="driver.options",
             ) from None
         finite = all(np.all(np.isfinite(array)) for array in (arrays.step, arrays.correct, arrays.sense, delays))

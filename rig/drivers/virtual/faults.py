@@ -51,7 +51,7 @@ class PassingFaults(Configured, Described):
     held_s: float = Field(0.02, gt=0, le=10)
     """For how long an output is held, s."""
     lost_per_s: float = Field(0.0, ge=0, le=1000)
-    """How often samples are lost on their way, 1/s on average."""
+    """How often samples are lost in transmission, 1/s on average."""
     lost_s: float = Field(0.005, gt=0, le=10)
     """For how long samples are lost, s."""
 

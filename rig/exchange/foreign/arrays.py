@@ -106,7 +106,7 @@ def _sheet(title: str, rows: Iterator[Row]) -> tuple[dict[str, Float], dict[str,
     names = _texts(heads[-1])
     places = [at for at, name in enumerate(names) if name]
     if len({names[at] for at in places}) < len(places) or not places:
-        raise ValueError(f"sheet '{title}': the names of its columns differ not all: {', '.join(names)[:80]}")
+        raise ValueError(f"sheet '{title}': its columns do not all have different names: {', '.join(names)[:80]}")
     data = [_values(title, row, number, places) for number, row in _numbered(first, rows, len(above) + 1)]
     columns = np.array(data, np.float64).reshape(-1, len(places))
     told = {names[at]: units[at].strip("[]() ") for at in places if at < len(units) and units[at]}
@@ -127,7 +127,7 @@ def _values(title: str, row: Row, number: int, places: Sequence[int]) -> list[fl
         if not isinstance(cell, int | float) or isinstance(cell, bool):
             from openpyxl.utils import get_column_letter
 
-            said = "is empty" if cell is None else f"'{str(cell)[:40]}' is no number"
+            said = "is empty" if cell is None else f"'{str(cell)[:40]}' is not a number"
             raise ValueError(f"sheet '{title}', cell {get_column_letter(at + 1)}{number}: {said}")
         out.append(float(cell))
     return out

@@ -116,7 +116,7 @@ def _unread(values: NDArray[np.generic], of: Mapping[str, Value]) -> Iterator[st
     """Yield in words what cannot be followed."""
     for key, value in of.items():
         if key in ("scale_factor", "add_offset") and number_in(value) is None:
-            yield f"has {key} {value!r}, which is no number"
+            yield f"has {key} {value!r}, which is not a number"
         if remark := factor_remark(key, value, "the attribute"):
             yield remark
     if str(of.get("_Unsigned", "")).lower() == "true" and values.dtype.kind == "i":

@@ -94,7 +94,7 @@ def _facts_of_tdms(name: str, every: Sequence[Mapping[str, object]]) -> ChannelF
     for key, value in (pair for one in properties for pair in one.items() if pair[0] != "wf_increment"):
         if (rate := rate_named(key, value)) is not None:
             rates.setdefault(key, rate)
-    remarks = [f"has a waveform over {of_time!s}, which is no unit of time"] if step and seconds is None else []
+    remarks = [f"has a waveform over {of_time!s}, which is not a unit of time"] if step and seconds is None else []
     if rates and max(rates.values()) / min(rates.values()) - 1.0 > _ONE_RATE:
         remarks.append(f"has several rates ({', '.join(f'{key} {rate:g} Hz' for key, rate in rates.items())})")
     remarks += [f"is scaled by {kind}, which npTDMS does not know" for kind in _unknown_scales(every)]
@@ -166,7 +166,7 @@ def _facts_of_mdf(name: str, signal: "Signal") -> ChannelFacts:
     even = even_sampling(signal.timestamps)
     remarks = [] if even is not None else ["is not evenly sampled; resample it"]
     if signal.master_metadata is not None and signal.master_metadata[1] not in _TIME:
-        remarks = [f"is sampled over '{signal.master_metadata[0]}', which is no time"]
+        remarks = [f"is sampled over '{signal.master_metadata[0]}', which is not a time"]
     if signal.invalidation_bits is not None and (invalid := int(np.count_nonzero(signal.invalidation_bits))):
         remarks.append(f"has {invalid} samples that are marked as invalid")
     return ChannelFacts(

@@ -115,7 +115,7 @@ def _add_row(segment: _Segment, cells: Sequence[str], decimal: str, number: int)
             value = float(cell.replace(decimal, "."))
         except ValueError:
             raise ValueError(
-                f"line {number} after its head, column '{segment.names[at]}': '{cell[:40]}' is no number"
+                f"line {number} after its head, column '{segment.names[at]}': '{cell[:40]}' is not a number"
             ) from None
         if column and len(column) < len(segment.columns[0]) - 1 and at:
             raise ValueError(

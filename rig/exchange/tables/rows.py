@@ -99,7 +99,7 @@ class Columns:
         if not cell.strip():
             raise RowFailed(line, column, "is empty; a number is wanted in every row")
         hint = '; write decimals with a point, or give `csv = { decimal = "," }`' if "," in cell else ""
-        raise RowFailed(line, column, f"'{cell.strip()[:60]}' is no number{hint}")
+        raise RowFailed(line, column, f"'{cell.strip()[:60]}' is not a number{hint}")
 
     def _quick(self, block: str) -> Float | None:
         """Return the rows as pandas reads them; None without pandas, and for a block in which anything is unusual."""
@@ -140,5 +140,5 @@ def cells_of(line: str, separator: str) -> list[str]:
         )
     except (csv.Error, StopIteration) as error:
         raise ImportFailed(
-            f"the line '{line[:40]} ...' of {len(line)} characters is no line of a table ({error})"
+            f"the line '{line[:40]} ...' of {len(line)} characters is not a line of a table ({error})"
         ) from None

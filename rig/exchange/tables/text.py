@@ -33,7 +33,7 @@ def encoding_of(path: Path) -> str:
         while True:
             if len(block.translate(None, _NO_TEXT)) < len(block):
                 at = place + next(at for at, byte in enumerate(block) if byte in _NO_TEXT)
-                raise ImportFailed(f"{path}: is no text in UTF-8 ({wrong or f'byte {at}: a control character'})")
+                raise ImportFailed(f"{path}: is not UTF-8 text ({wrong or f'byte {at}: a control character'})")
             try:
                 if not wrong and not (plain := plain and block.isascii()):
                     decoder.decode(block, final=not block)
@@ -70,7 +70,7 @@ def blocks(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
         except UnicodeError as error:
             said = encoding.removesuffix("-sig").upper()
             reason = getattr(error, "reason", str(error))
-            raise ImportFailed(f"{path}: is no text in {said} (after line {number}: {reason})") from None
+            raise ImportFailed(f"{path}: is not text in {said} (after line {number}: {reason})") from None
 
 
 def table_lines(blocks: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:

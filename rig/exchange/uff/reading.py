@@ -38,7 +38,7 @@ def datasets_in(path: Path) -> UniversalFile:
 
     text = read_bytes(path, LARGEST_BYTES, ImportFailed)
     if not re.match(rb"\s*-1\s*[\r\n]+\s*\d+", text[:400]):
-        raise ImportFailed(f"{path}: is no universal file; those begin with a line -1 and a dataset's number")
+        raise ImportFailed(f"{path}: is not a universal file; those begin with a line -1 and a dataset's number")
     if not text.rstrip().endswith(b"    -1"):
         raise ImportFailed(f"{path}: is cut short: the last dataset has no end")
     try:

@@ -257,5 +257,5 @@ def _said(facts: DeviceReport | None) -> list[str]:
     if facts["held_blocks"]:
         out.append(f"outputs were held in {facts['held_blocks']} of {facts['blocks']} blocks: they came too late")
     if facts["lost_blocks"]:
-        out.append(f"{facts['lost_blocks']} of {facts['blocks']} blocks were lost on their way")
+        out.append(f"{facts['lost_blocks']} of {facts['blocks']} blocks were lost in transmission")
     return out

@@ -175,4 +175,4 @@ def _asked(came: list[str], released: select.poll) -> str:
     """Return one sentence on what has asked this process to end (a signal, a campaign that is gone), or an empty text."""
     if came:
         return f"the loop's process was asked to end ({came[0]})"
-    return "the campaign has let go of the loop" if released.poll(0) else ""  # readable: it was closed
+    return "the campaign has released the loop" if released.poll(0) else ""  # readable: it was closed

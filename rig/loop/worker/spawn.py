@@ -87,7 +87,7 @@ class Worker:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(timeout_s)
                 return said
-        return f"{KILLED}, and it is there still as process {self.pid}"
+        return f"{KILLED}, and still exists as process {self.pid}"
 
     def close(self, timeout_s: float) -> str:
         """Wait a while for the process to end by itself, then `end` it; return what `end` returns."""

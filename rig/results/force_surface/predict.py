@@ -75,8 +75,8 @@ def _interpolated(curve: ConstantForceCurve) -> tuple[str, ...]:
     amplitude = 100.0 * float(np.nanmax(curve.amplitude_change))
     frequency = 100.0 * float(np.nanmax(curve.frequency_change_hz / curve.response.frequency_hz))
     return (
-        f"without every second level amplitudes change by up to {amplitude:.2g} %, frequencies by up to {frequency:.2g} %: "
-        "more than what the interpolation between all levels costs",
+        f"leaving out every second level changes amplitudes by up to {amplitude:.2g} %, frequencies by up to "
+        f"{frequency:.2g} %: the interpolation between all levels is more accurate than that",
     )
 
 

@@ -57,7 +57,7 @@ def _say(summary: dict[str, Any]) -> None:
         Column("force_n", "force", "N", ".4f"),
         Column("fit_residual", "fit leaves", "%", ".3f", 100.0),
     )
-    print(f"one more level would tell most at {1e3 * summary['next_level_m']:.4g} mm")
+    print(f"one more level would help most at {1e3 * summary['next_level_m']:.4g} mm")
 
 
 TABLE = Table(_summarise, _say)

@@ -81,7 +81,7 @@ def remark(found: IdentifiedPnlss, path: Path) -> Remark | None:
 def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:
     first, said = data.training[0], []
     if not data.validation:
-        said.append("no data to choose the iterate by: the last one is taken, however it does on other data")
+        said.append("no validation data: the last iterate is taken, whatever its error on other data")
     if "force" not in [channel.role for channel in (*first.input_channels, *first.output_channels)]:
         said.append("the force is neither input nor output: the model predicts multisines alone; add it to the outputs")
     if "voltage" in [channel.name for channel in first.input_channels]:

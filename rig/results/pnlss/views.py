@@ -123,6 +123,6 @@ def _history(axis: Axes, fit: "PnlssFit") -> None:
     axis.set(xlabel="iteration", ylabel="relative error, %")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     if fit.limited:
-        axis.set_title("stopped while it still paid", loc="right")
+        axis.set_title("stopped while still improving", loc="right")
     plain_log(axis)
     axis.legend()

@@ -73,13 +73,13 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
         of = (
             "the model that was fitted, by the covariance of the fit"
             if found.scatter is None
-            else "runs that nobody has measured, by the scatter of the model alone"
+            else "new runs, by the model's scatter from run to run alone"
         )
         said = (*said, f"bands and +- of responses: of {of}")
     elif found.scatter is not None:
         said = (
             *said,
-            "the model is that of a run in the middle; its scatter from run to run is not in these predictions",
+            "the model describes an average run; these predictions do not include its scatter from run to run",
         )
     notes = [*(_default(request, held) if request.forces_n else ()), *said]
     notes += other_specimens(model.specimen, [reference.measured for reference in references])
@@ -148,6 +148,6 @@ def _default(request: SimulatedPrediction, held: Held) -> tuple[str, ...]:
     if request.held is not None or held != "pure-sine":
         return ()
     return (
-        "constant is a force without harmonics, for nothing in the model makes any: an exciter model gives the "
-        "fundamental or the RMS of a force that a shaker makes",
+        "the force held constant has no harmonics, because nothing in the model makes any; with an exciter model, the "
+        "fundamental or the RMS of the shaker's force is held",
     )

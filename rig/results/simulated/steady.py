@@ -131,7 +131,7 @@ def _said(points: int, several: int, stable: np.ndarray, range_use: np.ndarray) 
     if several:
         notes.append(
             f"at {several} of {points} points several vibrations were found: the one nearest to the measured amplitude was "
-            "taken, which the model does not tell by itself"
+            "taken, which the model alone cannot decide"
         )
     if unstable:
         notes.append(f"{unstable} of {stable.size} vibrations are unstable")

@@ -35,7 +35,7 @@ def say_scatter(rows: list[dict[str, Any]] | None) -> None:
     if not rows:
         return
     print(
-        f"shifts from run to run, {rows[0]['recordings']} runs; the model is that of a run in the middle, errors are those "
+        f"shifts from run to run, {rows[0]['recordings']} runs; the model describes an average run; errors are those "
         "with each run's shifts"
     )
     ends = [[number(row[end], ".3g", 100.0) for end in ("width_low", "width_high")] for row in rows]

@@ -55,10 +55,10 @@ class EndReason(IntEnum):
     DRIVER_FAILED = 20, "the driver failed"
     SAMPLES_LOST = 21, "samples were lost for longer than is allowed"
     EMERGENCY_STOP = 22, "emergency stop"
-    LEVEL_NOT_FOLLOWED = 23, "the output rose and what it should hold did not follow"
-    PLANT_CONTRADICTED = 24, "force and motion are not those that the known plant gives for this output"
+    LEVEL_NOT_FOLLOWED = 23, "the output rose, but the controlled quantity did not follow"
+    PLANT_CONTRADICTED = 24, "force and motion do not fit the known plant at this output"
     OVER_LEVEL = 25, "force or motion far above its level"
-    GAIN_CHANGED = 26, "the output that the level takes has changed by more than the rig explains"
+    GAIN_CHANGED = 26, "the output needed for the level has changed by more than the rig explains"
 
     @property
     def is_trip(self) -> bool:

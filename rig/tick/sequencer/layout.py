@@ -69,7 +69,7 @@ class Outcome(IntEnum):
     OUTPUT_HELD = 11
     """The device held outputs that came too late."""
     SAMPLES_LOST = 12
-    """Too many samples were lost on their way."""
+    """Too many samples were lost in transmission."""
     OUTPUT_CONTINUED = 13
     """The device went on by itself for too many samples, because outputs came too late."""
 

@@ -137,7 +137,7 @@ class Codec:
             return HEARTBEAT_BODY.pack(version, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples & 0xFFFFFFFF)
         if isinstance(message, EmergencyStop):
             return STOP.pack(version, EMERGENCY_STOP, 0, message.reason)
-        raise TypeError(f"{message!r} is no message")
+        raise TypeError(f"{message!r} is not a message")
 
     def decode(self, payload: bytes) -> Message:
         """Decode a payload into a message. Arrays of counts are views of the payload, not copies. Raises only `Malformed`."""

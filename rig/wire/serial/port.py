@@ -94,7 +94,7 @@ def open_port(path: str, baud: int) -> serial.Serial:
         port.reset_input_buffer()
     except (OSError, termios.error) as error:
         port.close()
-        raise DaqDisconnected.of(error, where=f"port {path!r}: it went while it was being opened") from error
+        raise DaqDisconnected.of(error, where=f"port {path!r}: it disappeared while it was being opened") from error
     return port
 
 
@@ -111,7 +111,7 @@ def _refusal(path: str, baud: int, error: Exception) -> DaqError:
     is_of_termios = isinstance(cause, termios.error) and bool(cause.args)
     number = int(cause.args[0]) if cause and is_of_termios else getattr(error, "errno", None)
     if number in BUSY:
-        return DaqBusy("somebody else holds it", where=f"port {path!r}", hint="close the other program")
+        return DaqBusy("another program has it open", where=f"port {path!r}", hint="close the other program")
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO):
         names = port_names()
         there = ", ".join(names) or "none"

@@ -29,11 +29,11 @@ def test_one_mode_fitted_to_two_that_are_close_says_that_its_misfit_is_no_noise(
     found = linear_modes(accelerance([(80.0, 0.01), (80.8, 0.012)], noise))
     mode = found.nearest(80.0)
     if abs(found.damping_ratio[mode] - 0.01) > 4.0 * found.damping_ratio_std[mode]:
-        assert any("another mode close by" in note for note in found.notes)
+        assert any("another mode nearby" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("noise", [1e-4, 1e-3, 1e-2])
 def test_a_single_mode_in_noise_is_not_suspected(noise):
     found = linear_modes(accelerance([(80.0, 0.01)], noise))
     assert found.damping_ratio == pytest.approx([0.01], abs=4.0 * found.damping_ratio_std[0])
-    assert not any("another mode close by" in note for note in found.notes)
+    assert not any("another mode nearby" in note for note in found.notes)

@@ -134,7 +134,7 @@ def test_stretches_of_a_long_record_become_records():
 def test_samples_behind_the_last_whole_period_are_left_out_and_counted():
     found = map_time_data({"u": FORCE[0, 0].ravel()[:150], "y": MOTION[0, 0].ravel()[:150]}, told(period_samples=SIZE))
     assert found.records[0].samples.shape == (2, 128)
-    assert found.notes == ("22 samples at the end of a record are no whole period and were left out",)
+    assert found.notes == ("22 samples at the end of a record are not a whole period and were left out",)
 
 
 def test_scale_and_offset_turn_stored_numbers_into_the_unit():

@@ -185,10 +185,10 @@ def test_a_run_is_compared_with_the_scale_of_the_last_check_and_says_once_where_
     found = check(bench(), tmp_path / "check.h5", RunOptions(arm=True))
     checked = about("checked.h5")
     assert checked["checked"] == asdict(found.scale)
-    assert not any("unproven" in remark for remark in checked["remarks"])
+    assert not any("has not been checked" in remark for remark in checked["remarks"])
     remember(bench(), check=passed(bench()))  # as an earlier version kept it
     earlier = about("earlier.h5")
-    assert any("kept no numbers" in remark for remark in earlier["remarks"])
+    assert any("did not record it" in remark for remark in earlier["remarks"])
     remember(bench(), check=replace(passed(bench()), fingerprint="of another device", scale=found.scale))
     assert any("other channels" in remark for remark in about("other.h5")["remarks"])
 
@@ -204,14 +204,14 @@ def test_a_memory_of_an_earlier_version_has_no_scale(state):
 
 
 @pytest.mark.usefixtures("physical")
-def test_a_bench_without_another_shape_says_that_the_phase_of_the_drive_sensor_is_unproven(tmp_path):
+def test_a_bench_without_another_shape_says_that_the_phase_of_the_drive_sensor_cannot_be_checked(tmp_path):
     channels = [channel.model_dump() for channel in bench().channels]
     for channel in channels:
         channel["mode_shape"] = None
     alone = bench_with({"name": "beam next door", "block": 50, "channels": channels})
     with rig.run(PLAN, bench=alone, output=tmp_path / "run.h5", arm=True) as run:
         remarks = run.recording.parts[-1].information["about"]["remarks"]
-    assert sum("phase of drive is unproven" in remark for remark in remarks) == 1
+    assert sum("phase of drive cannot be checked" in remark for remark in remarks) == 1
 
 
 @pytest.mark.usefixtures("physical")

@@ -80,7 +80,7 @@ def test_a_name_that_no_file_can_have_is_refused(tmp_path):
         (b"a = 1e300", "a = 1e+300; allowed: 0, or a size from 1e-30 to 1e+30"),
         (b"[b]\na = [1.0, 5e-324]", "b.a[1] = 4.94066e-324; allowed: 0"),
         (b"a = nan", "a = nan; allowed: a finite number"),
-        (b"a = '\xff'", "is no text in UTF-8 (byte 5: invalid start byte)"),
+        (b"a = '\xff'", "is not UTF-8 text (byte 5: invalid start byte)"),
         (b"a = '\0'", "is not TOML"),
         (b'a = "\\u001b[31m"', r"a = '\x1b[31m'; allowed: printable text, without control characters"),
         (b'"\\u0000" = 1', r"holds the key '\x00'"),

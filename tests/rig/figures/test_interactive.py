@@ -211,7 +211,7 @@ def test_the_policy_allows_the_scripts_of_the_file_alone(drawn, tmp_path):
 def test_a_file_of_others_is_not_replaced(recordings, tmp_path):
     figure = tmp_path / "mine.html"
     figure.write_text("<p>notes</p>")
-    with pytest.raises(RecordingError, match="exists already and is no figure of this program"):
+    with pytest.raises(RecordingError, match="exists already and is not a figure of this program"):
         plot(recordings["sweep"], figure)
     assert figure.read_text() == "<p>notes</p>"
     plot(recordings["sweep"], figure, overwrite=True)

@@ -89,7 +89,7 @@ def test_who_overrides_is_recorded(tmp_path, monkeypatch):
     with run_plan(SHORT, careful(largest_trip_probability=0.02), tmp_path / "run.h5", options) as recording:
         overridden = recording.parts[0].information["about"]["rehearsal"]["overridden"]
     assert (overridden["why"], overridden["by"]) == ("the specimen is scrap", "a person")
-    assert "arms only what was rehearsed" in overridden["against"]
+    assert "arms only plans rehearsed" in overridden["against"]
 
 
 def test_names_and_arming_change_no_digest():
@@ -106,7 +106,7 @@ def test_a_recording_shows_its_rehearsal_and_resumes_with_it(tmp_path, foreseein
     print_summary(summarise(path))
     shown = capsys.readouterr().out
     assert "rehearsed: ends well 100 %, trips 0 % (up to 19 %) of 16 draws; r.h5" in shown
-    assert "within what was foreseen" in shown
+    assert "within the forecast" in shown
     with resume_run(path) as recording:
         assert recording.complete
     with Recording(path) as recording:

@@ -78,7 +78,7 @@ def test_a_contour_is_the_closed_form_and_is_compared_with_a_reference_at_every_
         np.testing.assert_allclose(size, curve.force_n, rtol=5e-3)
         assert not curve.stable.all()
         assert curve.range_use.max() < 1.0
-        assert any("without every second level" in note for note in curve.notes)
+        assert any("leaving out every second level" in note for note in curve.notes)
 
 
 def test_surface_and_curves_are_drawn(made, command, tmp_path):

@@ -39,7 +39,7 @@ def test_an_exciter_is_that_of_the_rig_within_its_errors(command, shelf):
 def test_an_exciter_is_shown_with_units_and_drawn(command, shelf, tmp_path):
     shown = command(f"show {shelf}/EX.h5")
     assert shown.status == 0
-    for text in ("damping by both", "N s/m", "moving mass", "trust their sum"):
+    for text in ("damping by both", "N s/m", "moving mass", "rely on their sum"):
         assert text in shown.out
     assert command(f"plot {shelf}/EX.h5 -o EX.png").status == 0
     assert (tmp_path / "EX.png").stat().st_size > 20_000

@@ -73,7 +73,7 @@ def check_data(
         names = ", ".join(c.name for c in start.inputs)
         raise IdentificationError(
             f"inputs {names}: one is a combination of the others throughout the training data, so that their effects "
-            "cannot be told apart; leave one out, or add experiments that drive them differently"
+            "cannot be separated; leave one out, or add experiments that drive them differently"
         )
 
 

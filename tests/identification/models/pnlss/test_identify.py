@@ -187,7 +187,7 @@ def test_of_too_many_states_for_a_band_it_says_how_many_it_tells() -> None:
 def test_of_more_states_than_move_the_outputs_a_note_says_how_many_do() -> None:
     linear = linear_model(oscillator(outputs=2))
     experiments = [measured(linear, multisine(seed), noise=1e-3, seed=seed) for seed in range(2)]
-    fewer = "states: 2 of 4 hardly move the outputs of the linear model; 2 may do"
+    fewer = "states: 2 of 4 hardly affect the outputs of the linear model; 2 may be enough"
     assert fewer in linear_pnlss(experiments, states=4).notes
     assert not any("hardly" in note for note in linear_pnlss(experiments, states=2).notes)
 

@@ -75,7 +75,7 @@ def test_the_friction_beam_decays_along_its_backbone_over_a_decade(friction):
 
 def test_the_note_says_what_is_left_of_the_accuracy(magnet):
     (note,) = decays(magnet)[0].notes
-    assert "through the measured force" in note
+    assert "using the measured force" in note
     assert "drive_mode_shape" in note
 
 

@@ -57,7 +57,7 @@ def test_a_level_out_of_reach_is_not_put_down_to_the_device():
 
 def test_an_attempt_that_is_measured_again_needs_no_remedy():
     assert DeviceFaults(14, 0, 3, 2000).text(final=False) == (
-        "outputs came too late: held in 14 samples of 2000, 3 of 2000 samples were lost on their way"
+        "outputs came too late: held in 14 samples of 2000, 3 of 2000 samples were lost in transmission"
     )
     both = DeviceFaults(14, 30, 0, 2000)
     assert both.text(final=False) == "outputs came too late: held in 14 and continued in 30 samples of 2000"
@@ -77,7 +77,7 @@ def test_continued_outputs_explain_a_disturbance_above_a_quarter_of_the_record(c
     [
         (Outcome.OUTPUT_HELD, {"held": 101}, "outputs came too late: held in 101 samples of 2000"),
         (Outcome.OUTPUT_CONTINUED, {"continued": 501}, "outputs came too late: continued in 501 samples of 2000"),
-        (Outcome.SAMPLES_LOST, {"lost": 101}, "101 of 2000 samples were lost on their way"),
+        (Outcome.SAMPLES_LOST, {"lost": 101}, "101 of 2000 samples were lost in transmission"),
     ],
 )
 def test_a_record_that_was_given_up_for_the_device_is_rejected_for_it(outcome, faults, said):

@@ -24,7 +24,7 @@ def test_a_heavily_damped_point_is_warned_with_the_shift_of_the_receptance_of_tw
     (warning,) = with_heavy_damping(point_with(damping_ratio)).warnings
     stated = float(warning.split("resonance by ")[1].split(" %")[0]) / 100.0
     assert shift / share == pytest.approx(stated, rel=0.05)
-    assert warning.startswith(f"damping ratio {100.0 * damping_ratio:g} %, trusted up to 10 %: other modes shift")
+    assert warning.startswith(f"damping ratio {100.0 * damping_ratio:g} % (warning above 10 %): other modes shift")
 
 
 def test_points_that_are_lightly_damped_or_held_no_phase_are_left_as_they_are():

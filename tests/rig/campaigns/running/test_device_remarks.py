@@ -58,7 +58,7 @@ def test_overloads_warn_and_lost_samples_are_counted() -> None:
     assert point.warnings == ("overload in 3 of 1000 samples",)
     point = with_device_remarks(made_point(), rows_with(SAMPLE_LOST, 7), COUNTERS)
     assert point.lost_samples == 7
-    assert point.warnings == ("7 of 1000 samples were lost on their way",)
+    assert point.warnings == ("7 of 1000 samples were lost in transmission",)
 
 
 LATE = {"lost_samples": 9, "late_blocks": 3, "reordered_blocks": 0, "out_of_order_frames": 3}
@@ -70,11 +70,11 @@ def test_where_blocks_came_too_late_for_their_place_the_order_is_named() -> None
     accepted = with_disorder(point, LATE)
     assert accepted.accepted
     assert accepted.warnings[-1].startswith(said)
-    refused = with_disorder(point.refused("7 of 1000 samples were lost on their way"), LATE)
-    assert refused.reason.startswith(f"7 of 1000 samples were lost on their way; {said}")
+    refused = with_disorder(point.refused("7 of 1000 samples were lost in transmission"), LATE)
+    assert refused.reason.startswith(f"7 of 1000 samples were lost in transmission; {said}")
     assert with_disorder(point, LATE | {"late_blocks": 0}) == point
     assert "1 frames too late" in with_disorder(point, LATE | {"late_blocks": 0, "late_frames": 1}).warnings[-1]
-    failed = made_point(quality=Quality.REJECTED, reason="7 of 9 samples were lost on their way")
+    failed = made_point(quality=Quality.REJECTED, reason="7 of 9 samples were lost in transmission")
     assert with_disorder(failed, LATE).reason.startswith(f"{failed.reason}; {said}")
     whole = with_device_remarks(made_point(), rows_with(0, 0), COUNTERS)
     assert with_disorder(whole, LATE) == whole

@@ -1,4 +1,4 @@
-"""Samples lost on their way leave gaps, never zeros: in the tick, in the file, in the points, in what is exported."""
+"""Samples lost in transmission leave gaps, never zeros: in the tick, in the file, in the points, in what is exported."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_a_point_with_lost_samples_is_the_point_without(monkeypatch, whole, gaps
         assert run.complete
         for point, sound in zip(points, whole, strict=True):
             assert point["lost_samples"] > 0
-            assert any("lost on their way" in warning for warning in point["warnings"])
+            assert any("lost in transmission" in warning for warning in point["warnings"])
             assert point["frequency_hz"] == pytest.approx(sound["frequency_hz"], rel=1e-4)
             assert point["damping_ratio"] == pytest.approx(sound["damping_ratio"], rel=2e-3)
             assert point["amplitude_m"] == pytest.approx(sound["amplitude_m"], rel=1e-3)
@@ -171,7 +171,7 @@ def test_too_many_lost_samples_refuse_the_point(monkeypatch):
     with rig.run(plan_with(levels_v=(0.8,)), seed=1) as run:
         point = run.recording.points[0]
     assert not point["accepted"]
-    assert "were lost on their way" in point["reason"]
+    assert "were lost in transmission" in point["reason"]
     assert "allowed is up to 5%" in point["reason"]
 
 
@@ -210,7 +210,7 @@ def test_too_many_lost_samples_refuse_a_point_of_a_slow_flow(monkeypatch):
     assert not point["accepted"]
     assert (
         point["reason"]
-        == f"{point['lost_samples']} of {rows_of(point)} samples were lost on their way, allowed is up to 5%"
+        == f"{point['lost_samples']} of {rows_of(point)} samples were lost in transmission, allowed is up to 5%"
     )
 
 
@@ -225,7 +225,7 @@ def test_windows_of_which_more_than_2_percent_are_lost_are_told():
     assert too_many_lost(lost, first, end).tolist() == [False] * 6
     assert too_many_lost(lost, np.array([100, 100, 499]), np.array([199, 102, 501])).tolist() == [True, True, True]
     assert lost_objection(50, 1000) == ""
-    assert lost_objection(51, 1000) == "51 of 1000 samples were lost on their way, allowed is up to 5%"
+    assert lost_objection(51, 1000) == "51 of 1000 samples were lost in transmission, allowed is up to 5%"
 
 
 def test_a_sweep_with_scattered_lost_samples_has_all_its_instants(monkeypatch):

@@ -458,6 +458,6 @@ REFUSED: dict[tuple[str, str], tuple[tuple[Writer, str], ...]] = {
     ("NumPy", "uneven instants"): ((npz_uneven, "is not evenly spaced"),),
     ("NumPy", "missing, invalid"): ((npz_not_a_number, "value at [5] is nan"),),
     ("workbook", "uneven instants"): ((xlsx_uneven, "is not evenly spaced"),),
-    ("workbook", "missing, invalid"): ((xlsx_text, "cell B8: 'OVER' is no number"),),
+    ("workbook", "missing, invalid"): ((xlsx_text, "cell B8: 'OVER' is not a number"),),
     ("LabVIEW", "start time"): ((lvm_starts_between_samples, "samples before another"),),
 }

@@ -166,9 +166,9 @@ BROKEN: dict[str, tuple[str, Callable[[Path], None], str, str]] = {
         "x.csv",
         text("F;a\n1,5;2,5\n1,5;2,5\n"),
         RATE,
-        r"'1,5' is no number; write decimals with a point",
+        r"'1,5' is not a number; write decimals with a point",
     ),
-    "a binary file called CSV": ("x.csv", noise, RATE, r"is no text in UTF-8"),
+    "a binary file called CSV": ("x.csv", noise, RATE, r"is not UTF-8 text"),
     "a universal file cut short": (
         "x.uff",
         cut(files.universal, 0.7),
@@ -193,8 +193,8 @@ BROKEN: dict[str, tuple[str, Callable[[Path], None], str, str]] = {
         "",
         r"`?sample_rate_hz`?: disagrees \(file \(F\) 2048 Hz, file \(a\) 1024 Hz\)",
     ),
-    "no JSON": ("x.json", text("[{"), "", r"is no JSON"),
-    "no list of series": ("x.json", text('{"a": 1}'), "", r"is no list of SEP005 time series"),
+    "no JSON": ("x.json", text("[{"), "", r"is not JSON"),
+    "no list of series": ("x.json", text('{"a": 1}'), "", r"is not a list of SEP005 time series"),
     "a series without data": ("x.json", text(json.dumps([{"name": "F", "unit_str": "N"}])), "", r"series\[0\]\.data"),
     "another ending": ("x.dat", noise, "", r"the ending says no format; give `format`, one of mat, uff, csv, hdf5"),
 }

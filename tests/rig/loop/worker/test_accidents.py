@@ -224,7 +224,7 @@ class Stubborn:
             raise subprocess.TimeoutExpired("loop", timeout)
 
 
-@pytest.mark.parametrize(("killable", "said"), [(True, "has acted$"), (False, "there still as process 4711")])
+@pytest.mark.parametrize(("killable", "said"), [(True, "has acted$"), (False, "still exists as process 4711")])
 def test_a_process_that_had_to_be_killed_is_said_at_the_end_of_the_session(monkeypatch, killable, said):
     process, bench = Stubborn(killable), slow_bench()
     worker = object.__new__(Worker)

@@ -105,7 +105,8 @@ def test_a_fit_that_is_stopped_while_it_pays_says_so_and_one_that_has_arrived_do
     lowered = 100 * (1 - errors[-1] / errors[-2])
     assert short.limited
     assert short.message == (
-        f"stopped at its limit of 3 iterations while it still paid: the last one lowered the training error by {lowered:.2g} %"
+        f"stopped at its limit of 3 iterations while still improving: the last one lowered the training error by "
+        f"{lowered:.2g} %"
     )
     assert decode(PnlssFit, *encode(short)).limited
     whole = fit_pnlss(start, experiments, resume=short)
