@@ -11,7 +11,7 @@ import typer
 from rig.cli.analyse import app as analyse_app
 from rig.cli.calibrate import calibrate_
 from rig.cli.check import check_
-from rig.cli.compiling import say_what_is_compiled
+from rig.cli.compiling import compiling_is_said
 from rig.cli.conformance import conformance
 from rig.cli.docs import docs
 from rig.cli.doctor import doctor
@@ -30,6 +30,7 @@ from rig.cli.report import report_
 from rig.cli.run import resume, run
 from rig.cli.schema import new, schema
 from rig.cli.show import plot_, show
+from rig.cli.slow_commands import waiting_for
 from rig.cli.stop import stop
 from rig.cli.studies import StudyCommand, reproduce_
 from rig.cli.tune import tune_
@@ -76,12 +77,12 @@ def main() -> None:
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     say_what_is_imported()
-    say_what_is_compiled()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # also print to a terminal that cannot show µ
     try:
-        status = app(arguments, prog_name="rig", standalone_mode=False)
+        with waiting_for(arguments), compiling_is_said():
+            status = app(arguments, prog_name="rig", standalone_mode=False)
         if status == STOPPED:  # typer turns Ctrl-C into this status without a message
             _complain("interrupted", STOPPED)
     except (KeyboardInterrupt, typer.Abort):

@@ -1,12 +1,14 @@
-"""A line for who waits while kernels are compiled, on a terminal."""
+"""A line for who waits while kernels are compiled."""
 
-import sys
+import contextlib
 import time
+from collections.abc import Iterator
 
+from rig.show.waiting import say_beside
 from vibrolock.compiling import on_compiling
 
 FEW = 5  # kernels that are compiled without a word
-EVERY_S = 5.0  # s between two lines on the terminal; chosen
+EVERY_S = 5.0  # s between two lines; chosen
 
 
 class _Lines:
@@ -21,11 +23,16 @@ class _Lines:
         if self.count < FEW or time.monotonic() < self.due_s:
             return
         self.due_s = time.monotonic() + EVERY_S
-        so_far = f" ({self.count} kernels so far)" if self.count > FEW else ""
-        print(f"compiling, once; some fifteen seconds of one core{so_far}", file=sys.stderr, flush=True)
+        so_far = f" ({self.count} functions so far)" if self.count > FEW else ""
+        say_beside(f"compiling for this computer, only this time: some fifteen seconds of one core{so_far}")
 
 
-def say_what_is_compiled() -> None:
-    """Say on a terminal that kernels are compiled, for it takes a while and happens in the middle of something else."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        on_compiling.append(_Lines())
+@contextlib.contextmanager
+def compiling_is_said() -> Iterator[None]:
+    """Say that kernels are compiled, for it takes a while and happens in the middle of something else."""
+    lines = _Lines()
+    on_compiling.append(lines)
+    try:
+        yield
+    finally:
+        on_compiling.remove(lines)

@@ -22,6 +22,7 @@ def conformance(
     """Test an installed driver against the contract that every driver keeps; say at the end what is unproven, and why."""
     from rig.bench import DriverChoice, load_bench
     from rig.conformance.run import OUTCOMES, check_driver, require_arming, unproven
+    from rig.show.waiting import heard
     from rig.text.console import print_json
 
     chosen = load_bench(bench)
@@ -31,6 +32,7 @@ def conformance(
     found = []
     for finding in check_driver(chosen, output_log):
         found.append(finding)
+        heard()
         if not json:
             print(
                 f"{finding.outcome:14} {finding.test}" + (f": {finding.detail}" if finding.detail else ""), flush=True

@@ -42,6 +42,7 @@ class IdentifyGroup(KindGroup):
         from rig.results.files import save
         from rig.results.identify import identify_model
         from rig.show.progress import FitLines
+        from rig.show.waiting import Waiting
         from rig.system.stop_signals import escalating
 
         files, kind, known = values.pop("files"), word or values.pop("kind"), self.kinds()
@@ -52,7 +53,8 @@ class IdentifyGroup(KindGroup):
         with escalating() as signals:
             lines = FitLines(signals.check)
             try:
-                found = identify_model(files, options, progress=lines)
+                with Waiting(f"identifying a {kind} model from {', '.join(map(str, files))}"):
+                    found = identify_model(files, options, progress=lines)
             finally:
                 lines.close()
         save(found, output)

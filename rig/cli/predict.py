@@ -1,6 +1,7 @@
 """``rig predict``: predict vibrations with models."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,14 +36,14 @@ class PredictGroup(KindGroup):
         from rig.cli.option_parameters import given_in
         from rig.results.files import save
         from rig.results.predict import predict_vibrations
+        from rig.results.predictions.sweeps import expected_duration
         from rig.show.waiting import Waiting
 
         model = values.pop("model")
         given = given_in(values)
         sources = [one for value in given.values() for one in (value if isinstance(value, list) else [value])]
         keep_existing([model, *(one for one in sources if isinstance(one, Path))], output, overwrite)
-        swept = len(given.get("sweeps") or ()) + len(given.get("planned") or ())
-        usual = "usually 10 to 40 s a recording or plan of sweeps" if swept else ""
+        usual = partial(expected_duration, given.get("sweeps") or (), given.get("planned") or ())
         with Waiting(f"predicting with {model}", usual):
             save(predict_vibrations(model, given, kind=word), output)
         show_file(output, json)

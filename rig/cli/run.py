@@ -1,14 +1,16 @@
 """``rig run`` and ``rig resume``: carry out a plan, and finish an interrupted run."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.options import Json, plan_and_bench
-from rig.cli.run_options import of_a_further_part, of_a_recording, shown, with_options
+from rig.cli.run_options import by_the_clock, of_a_further_part, of_a_recording, shown, with_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
@@ -43,6 +45,7 @@ def run(
 ) -> None:
     """Carry out a plan and record it."""
     from rig.campaigns.running.runner import run_plan
+    from rig.show.waiting import Waiting
 
     loaded, chosen = plan_and_bench(plan, bench)
     if output is None and not dry_run:
@@ -57,7 +60,9 @@ def run(
 
         options = replace(options, check=checked_scale(check, chosen))
     options = _with_rehearsal(options, rehearsal, override_rehearsal)
-    _carry(loaded.kind, options, lambda watched: run_plan(loaded, chosen, output, watched), json, plan)
+    how_long = partial(_how_long, loaded, chosen, by_the_clock(chosen, options))
+    with Waiting(f"running {plan} on {chosen.name}", how_long):
+        _carry(loaded.kind, options, lambda watched: run_plan(loaded, chosen, output, watched), json, plan)
 
 
 @with_options(of_a_further_part, monitored=True)
@@ -80,19 +85,31 @@ def resume(
     from rig.campaigns.plans import load_plan
     from rig.campaigns.running.runner import resume_run
     from rig.recording.reader import Recording
+    from rig.show.waiting import Waiting
 
     with Recording(output) as recording:
         kind = recording.kind
     change = None if plan is None else load_plan(plan)
     options = _with_rehearsal(options, rehearsal, override_rehearsal)
-    _carry(
-        kind,
-        options,
-        lambda watched: resume_run(
-            output, watched, change=change, source=plan or "", retry_tripped=retry_tripped, trust_code=trust_code
-        ),
-        json,
-    )
+    with Waiting(f"resuming {output}"):
+        _carry(
+            kind,
+            options,
+            lambda watched: resume_run(
+                output, watched, change=change, source=plan or "", retry_tripped=retry_tripped, trust_code=trust_code
+            ),
+            json,
+        )
+
+
+def _how_long(plan: "Plan", bench: "Bench", by_the_clock: bool) -> str:
+    """Say how long a run takes; nothing if plan and bench do not fit, which the run itself will say."""
+    from rig.campaigns.running.dry_run import expected_duration
+    from rig.errors import RigError
+
+    with suppress(RigError):
+        return expected_duration(plan, bench, by_the_clock=by_the_clock)
+    return ""
 
 
 def _with_rehearsal(options: "RunOptions", rehearsal: Path | None, override: str) -> "RunOptions":

@@ -4,13 +4,13 @@ import contextlib
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Self
+from typing import ClassVar, Self
 
 from vibrolock.printable import printable
 
-FIRST_S = 1.5  # silence after which it is said what is being done; chosen: before a person wonders
+FIRST_S = 1.0  # silence after which it is said what is being done; chosen: with the start of Python, before two seconds
 FURTHER_S = 15.0  # silence after which it is said again; chosen
 
 
@@ -19,6 +19,8 @@ class _Silence:
 
     since_s = 0.0
     wanted = 0
+    waiting: ClassVar[list["Waiting"]] = []
+    """Those that wait: the last one, which is the most exact, speaks."""
 
 
 def heard() -> None:
@@ -37,20 +39,29 @@ def silence() -> Iterator[None]:
         heard()
 
 
+def say_beside(text: str) -> None:
+    """Say something else that makes a command slow, with its time; nothing if it is quick so far."""
+    if _Silence.waiting and not _Silence.wanted:
+        _Silence.waiting[0].beside(text)
+
+
 class Waiting:
     """Says what a command does: after a moment, or at once if ``announced``; again after each further silence.
 
-    ``usual``: how long it takes, in words; it is said with the first line.
+    ``usual``: how long it takes, in words, or a function that says it when it is asked; it is said with the first line. If
+    several wait, one inside the other, the innermost speaks.
     """
 
-    def __init__(self, what: str, usual: str = "", *, announced: bool = False) -> None:
+    def __init__(self, what: str, usual: str | Callable[[], str] = "", *, announced: bool = False) -> None:
         self._what, self._usual, self._announced = what, usual, announced
         self._began_s = time.monotonic()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="waiting", daemon=True)
 
     def __enter__(self) -> Self:
-        heard()
+        if not _Silence.waiting:
+            heard()
+        _Silence.waiting.append(self)
         if self._announced:
             self._say()
         self._thread.start()
@@ -61,24 +72,34 @@ class Waiting:
     ) -> None:
         self._over.set()
         self._thread.join()
+        _Silence.waiting.remove(self)
 
     def now(self, what: str, usual: str = "") -> None:
         """Say what is done from now on."""
         self._what, self._usual = what, usual
         self._say()
 
+    def beside(self, text: str) -> None:
+        """Say ``text``, unless the command is quick so far."""
+        if time.monotonic() - self._began_s >= FIRST_S:
+            self._print(text)
+
     def _watch(self) -> None:
         longest_s = FURTHER_S if self._announced else FIRST_S
-        while not self._over.wait(0.2):
-            if not _Silence.wanted and time.monotonic() - _Silence.since_s >= longest_s:
+        while not self._over.wait(0.1):
+            silent_s = time.monotonic() - _Silence.since_s
+            if not _Silence.wanted and _Silence.waiting[-1:] == [self] and silent_s >= longest_s:
                 self._say()
                 longest_s = FURTHER_S
 
     def _say(self) -> None:
-        usual = f", {self._usual}" if self._usual else ""
-        self._usual = ""
+        usual, self._usual = self._usual, ""
+        said = usual() if callable(usual) else usual
+        self._print(f"{self._what}, {said}" if said else self._what)
+
+    def _print(self, text: str) -> None:
         with contextlib.suppress(OSError, ValueError):
             clear = "\r\x1b[2K" if sys.stderr.isatty() else ""
-            line = printable(f"[{time.monotonic() - self._began_s:.0f} s] {self._what}{usual}")
+            line = printable(f"[{time.monotonic() - self._began_s:.0f} s] {text}")
             print(f"{clear}{line}", file=sys.stderr, flush=True)
         heard()

@@ -70,7 +70,7 @@ def interrupted(words: list[str]) -> str:
     command = [sys.executable, "-c", "from rig.cli import main; main()", *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stderr is not None
-        first = child.stderr.readline()
+        first = next(line for line in child.stderr if not line.startswith("["))  # said while nothing else is
         child.send_signal(signal.SIGINT)
         out, err = child.communicate(timeout=LONG_S)
     assert first.startswith("point"), first + err

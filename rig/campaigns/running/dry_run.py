@@ -18,6 +18,8 @@ from rig.tick.layout import recorded_row
 from rig.tick.sequencer.layout import EVALUATED, SegmentKind
 
 MOST_LEVELS = 20  # levels that are listed; chosen: two lines
+SLOW, FAST = 25.0, 70.0
+"""Times real time of one process with the evaluation of its points: of the magnet beam's backbone on two machines."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,15 @@ class DryRun:
             *(f"{'arming' if not number else '':10}{line}" for number, line in enumerate(self.arming)),
             "nothing was driven",
         ]
+
+
+def expected_duration(plan: Plan, bench: Bench, *, by_the_clock: bool) -> str:
+    """Return how long a run takes, in words: at least, and at most for plans whose points settle; empty if that is unknown."""
+    found = dry_run(plan, bench, Path("recording.h5"))
+    least_s, most_s = found.least.duration_s, found.most.duration_s
+    if by_the_clock:
+        return _between(duration(least_s), duration(most_s))
+    return f"some {duration(least_s / FAST)} to {duration(least_s / SLOW)} on a virtual rig for {duration(least_s)} of test"
 
 
 def dry_run(plan: Plan, bench: Bench, output: Path) -> DryRun:

@@ -1,6 +1,7 @@
 """Recorded and planned sweeps, predicted by a nonlinear mode."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,10 +22,29 @@ from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.sweep.plan import SweepPlan
-from rig.errors import ConfigurationError, RecordingError
+from rig.errors import ConfigurationError, RecordingError, RigError
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.recording.reader import Recording
 from rig.results.predictions.references import Swept
+from rig.text.durations import duration
+
+SLOW, FAST = 5.0, 20.0
+"""Times real time of predicted sweeps, with reading them: of a structured model with an exciter on two machines."""
+
+
+def expected_duration(recordings: Sequence[Path], plans: Sequence[str]) -> str:
+    """Return how long it takes to predict recorded and planned sweeps, in words; empty if that is unknown."""
+    sweeps_s = 0.0
+    with suppress(RigError, OSError):
+        for path in recordings:
+            with Recording(path) as recording:
+                sweeps_s += recording.n_rows / bench_of_recording(recording).sample_rate_hz
+        for source in plans:
+            plan = planned(source)
+            sweeps_s += plan.sweep_s * len(plan.levels)
+    if not sweeps_s:
+        return ""
+    return f"some {duration(sweeps_s / FAST)} to {duration(sweeps_s / SLOW)} for {duration(sweeps_s)} of sweeps"
 
 
 @dataclass(frozen=True)

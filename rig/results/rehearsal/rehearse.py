@@ -9,7 +9,7 @@ from pathlib import Path
 from rig.bench import Bench
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.dry_run import dry_run
+from rig.campaigns.running.dry_run import FAST, SLOW, dry_run
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -25,8 +25,6 @@ from rig.results.kinds import KINDS
 from rig.text.durations import duration
 
 START_S = 10.0  # s until the processes of a rehearsal are at work; measured on two cores
-SLOW, FAST = 25.0, 70.0
-"""Times real time of one process with the evaluation of its points: of the magnet beam's backbone on two machines."""
 FURTHER_SEED = 1
 """Added to the seed of a rehearsal for that of the improved plan, which was chosen by the first one's twins."""
 

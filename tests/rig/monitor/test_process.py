@@ -132,7 +132,7 @@ def test_a_run_with_a_page_beside_it(tmp_path):
     (tmp_path / "plan.toml").write_text(PLAN)
     with started("run", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "run.h5"), "--realtime", "--monitor") as run:
         assert run.stderr is not None
-        line = run.stderr.readline()
+        line = next(line for line in run.stderr if not line.startswith("["))  # said while nothing else is
         assert line.startswith("note: the page is at http://127.0.0.1:")
         visitor = Visitor(address_in(line)).enter()
         wait_until(lambda: visitor.state()["facts"] is not None, "the run on the page")

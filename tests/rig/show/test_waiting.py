@@ -6,7 +6,7 @@ import time
 import pytest
 
 from rig.show import waiting
-from rig.show.waiting import Waiting, heard, silence
+from rig.show.waiting import Waiting, heard, say_beside, silence
 
 
 @pytest.fixture(autouse=True)
@@ -49,3 +49,18 @@ def test_nothing_is_said_while_a_person_types_or_something_else_is_shown(capsys)
             heard()
             time.sleep(0.05)
     assert said(capsys) == []
+
+
+def test_of_two_the_inner_one_speaks_with_what_it_is_told_when_it_does(capsys):
+    with Waiting("working"), Waiting("computing", lambda: "some seconds"):
+        time.sleep(0.6)
+    assert said(capsys) == ["[0 s] computing, some seconds"]
+
+
+def test_what_makes_a_command_slow_is_said_beside_unless_it_is_quick(capsys):
+    with Waiting("working"):
+        say_beside("compiling")
+        time.sleep(0.5)
+        say_beside("compiling")
+    say_beside("compiling")
+    assert [line.partition("] ")[2] for line in said(capsys)] == ["working", "compiling"]
