@@ -23,7 +23,7 @@ use_memory_for_files()
 shared_folder()  # before workers are started, which then share it
 install_studies()
 
-pytest_plugins = ["tests.changed.plugin", "tests.command"]
+pytest_plugins = ["tests.changed.plugin", "tests.command", "tests.browsing"]
 
 # Shared machines and the first compilation of a kernel make any deadline a coin toss; speed is measured in benchmarks/.
 # Examples are the same on every machine and in every run: what one finds is found again. HYPOTHESIS_SEARCH=1 seeks others.

@@ -7,6 +7,9 @@ import typer
 
 from rig.cli.options import Json, show_file
 
+SCREEN = "screen"
+"""Style without a wish."""
+
 
 def show(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")], json: Json = False
@@ -31,7 +34,7 @@ def plot_(
     lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
     style: Annotated[
         str, typer.Option(help="screen, paper (one column, 85 mm), slide (16:9), or a style sheet of matplotlib.")
-    ] = "screen",
+    ] = SCREEN,
     size: Annotated[str, typer.Option(metavar="WxH", help="Width and height, mm, or the width alone.")] = "",
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace OUTPUT also where it is not a figure of this program.")
@@ -43,6 +46,7 @@ def plot_(
     from rig.figures.files import plot
 
     view = View(amplitude, channel, harmonic, _limits_hz(frequency))
+    _refuse_looks_of_a_page(output, style=style if style != SCREEN else "", size=size)
     restyle(style, size_mm=_size_mm(size))
     try:
         chosen = None if view == View() else view
@@ -50,6 +54,18 @@ def plot_(
         plot(files, output, lateness=lateness, labels=label or (), view=chosen, panels=names, overwrite=overwrite)
     finally:
         restyle()
+    print(f"figure: {output}")
+
+
+def _refuse_looks_of_a_page(output: Path, **given: str) -> None:
+    """Refuse style and size for a figure in a browser, which takes the window's size and its own looks."""
+    from rig.errors import RecordingError
+
+    for name, value in given.items():
+        if value and output.suffix.lower() == ".html":
+            raise RecordingError(
+                f"`{name}` {value}: is for .png, .pdf and .svg; {output} fits itself to the window of the browser"
+            )
 
 
 def _size_mm(text: str) -> tuple[float, float | None] | None:

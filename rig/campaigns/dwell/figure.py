@@ -3,9 +3,10 @@
 import numpy as np
 
 from rig.campaigns.dwell.points import DwellResult, recorded_course
-from rig.campaigns.evaluation.figure import heading
-from rig.campaigns.evaluation.recorded import points_of
+from rig.campaigns.evaluation.figure import heading, notes_of
+from rig.campaigns.evaluation.recorded import accepted_points, points_of
 from rig.drawing.axes import widen
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, engineering
 from rig.recording.reader import Recording
@@ -28,10 +29,11 @@ def draw(page: Figure, recording: Recording) -> None:
         (axes[1, 0], amplitude, f"displacement amplitude, {unit}", "" if held else "amplitude"),
         (axes[1, 1], course.force_n, "fundamental force, N", "amplitude" if held else ""),
     )
+    notes = notes_of(accepted_points(recording, DwellResult))
     results = [point.result for point in points_of(recording, DwellResult) if not point.accepted]
     left_out = [result.cycles for result in results if result is not None and result.cycles is not None]
     for axis, values, label, watched in panels:
-        axis.plot(course.cycles, values, "o-", color=MAIN)
+        note_points(axis.plot(course.cycles, values, "o-", color=MAIN)[0], notes)
         axis.set(xlabel="cycles", ylabel=label)
         _limits(axis, values, plan, watched)
         if left_out:

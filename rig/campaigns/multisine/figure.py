@@ -3,11 +3,12 @@
 import numpy as np
 
 from identification import IdentificationError, InstrumentResponse, PeriodicSpectra, coherence
-from rig.campaigns.evaluation.figure import refused
-from rig.campaigns.evaluation.recorded import points_of, specimen_of
+from rig.campaigns.evaluation.figure import notes_of, refused
+from rig.campaigns.evaluation.recorded import accepted_points, points_of, specimen_of
 from rig.campaigns.evaluation.vibrations import VOLTAGE
-from rig.campaigns.multisine.points import recorded_spectra
+from rig.campaigns.multisine.points import MultisineResult, recorded_spectra
 from rig.drawing.axes import log_axis
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import (
     MAIN,
@@ -36,20 +37,22 @@ def draw(page: Figure, recording: Recording) -> None:
     left_out = refused(points_of(recording))
     mean = f"mean of {_counted(realisations, 'realisation')} of {_counted(periods, 'period')}"
     text = f"{specimen_of(recording)}: multisine, {level:g} V RMS{others}, {mean}"
-    draw_multisine(page, at_level, title=text + (f", {left_out}" if left_out else ""))
+    notes = notes_of(point for point in accepted_points(recording, MultisineResult) if point.level == level)
+    draw_multisine(page, at_level, title=text + (f", {left_out}" if left_out else ""), note="; ".join(notes))
 
 
-def draw_multisine(page: Figure, spectra: PeriodicSpectra, *, title: str = "") -> None:
+def draw_multisine(page: Figure, spectra: PeriodicSpectra, *, title: str = "", note: str = "") -> None:
     """Draw amplitude spectra of voltage, force and response, and the frequency response with its noise and coherence.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Lines that are not excited have separate marks for odd and even. What
-    exceeds the noise on them is odd or even nonlinear distortion of the rig, including the shaker.
+    exceeds the noise on them is odd or even nonlinear distortion of the rig, including the shaker. ``note`` is told of excited
+    lines to who points at them, such as the quality of the realisations.
     """
     force = next(channel.name for channel in spectra.channels if channel.role == "force")
     axes = grid(page, 3, 2, down_columns=True)
     names = {VOLTAGE.name: "voltage", force: "force", "drive": "drive"}
     for axis, (name, text) in zip(axes[:, 0], names.items(), strict=True):
-        _spectrum(axis, spectra, name, text)
+        _spectrum(axis, spectra, name, text, note)
     measured = spectra.frequency_response("drive", instrument=VOLTAGE.name)
     _response(axes[0, 1], axes[1, 1], measured, f"drive over {force}")
     _coherence(axes[2, 1], spectra, "drive", force)
@@ -61,13 +64,14 @@ def _counted(number: int, thing: str) -> str:
     return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
-def _spectrum(axis: Axes, spectra: PeriodicSpectra, name: str, text: str) -> None:
+def _spectrum(axis: Axes, spectra: PeriodicSpectra, name: str, text: str, note: str) -> None:
     row, excited = spectra.index(name), spectra.excited
     amplitude, noise = spectra.amplitude[row], spectra.noise_std[row]
     dots = {"ls": "", "markersize": _DOT * rc("lines.markersize")}
-    axis.semilogy(
+    (drawn,) = axis.semilogy(
         spectra.frequency_hz[excited], amplitude[excited], marker="o", color=MAIN, label="excited lines", **dots
     )
+    note_points(drawn, (), f"excited lines ({note})" if note else "")
     floor = 1e-6 * amplitude[excited].max()  # anything lower is rounding, not noise
     if not excited.all():
         for name, marker, colour, parity in (("odd", "x", THIRD, ~spectra.even), ("even", "+", SECOND, spectra.even)):

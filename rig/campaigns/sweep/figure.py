@@ -3,12 +3,13 @@
 import numpy as np
 
 from identification import ForceDropOut, Transient, force_drop_out, zero_crossings
-from rig.campaigns.evaluation.figure import refused
+from rig.campaigns.evaluation.figure import notes_of, refused
 from rig.campaigns.evaluation.point import result_of
 from rig.campaigns.evaluation.recorded import point_rows, points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import columns_for, grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, Axes, Figure, title as heading, unit_text
 from rig.recording.reader import Recording
@@ -35,6 +36,7 @@ def draw(page: Figure, recording: Recording) -> None:
         np.vstack([rows["inputs"].T, rows["output_v"]]),
         float(recording.configuration["bench"]["sample_rate_hz"]),
         drop_out=None if held is not None else force_drop_out(sweep, off_resonance_hz=off_resonance_hz),
+        note=notes_of([point])[0],
         title=f"{specimen_of(recording)}: {text}" + (f", {left_out}" if left_out else ""),
     )
 
@@ -46,6 +48,7 @@ def draw_sweep(
     sample_rate_hz: float,
     *,
     drop_out: ForceDropOut | None = None,
+    note: str = "",
     title: str = "",
 ) -> None:
     """Draw voltage, force, response and instantaneous frequency over time.
@@ -62,6 +65,8 @@ def draw_sweep(
         Samples per second.
     drop_out
         Drop-out of the force, whose characteristic points are marked; None: no marks.
+    note
+        What is told of the fundamentals to who points at them, such as their quality.
     title
         Heading.
     """
@@ -73,8 +78,9 @@ def draw_sweep(
         row = sweep.index(name)
         _signal(axis, np.asarray(samples[row], dtype=np.float64), longest, sample_rate_hz)
         envelope = np.abs(sweep.fundamentals[row])
-        axis.plot(sweep.time_s, envelope, color=SECOND, label="fundamental")
-        axis.plot(sweep.time_s, -envelope, color=SECOND)
+        for values, label in ((envelope, "fundamental"), (-envelope, None)):
+            (drawn,) = axis.plot(sweep.time_s, values, color=SECOND, label=label)
+            note_points(drawn, (), f"fundamental ({note})" if note else "")
         axis.set(ylabel=f"{text}, {unit_text(sweep.channels[row].unit)}")
     _momentary_frequency(axes[3], sweep, np.asarray(samples[sweep.index(force)]), sample_rate_hz)
     if drop_out is not None:

@@ -12,6 +12,8 @@ from rig.drawing.style import Figure
 
 MARK = '<meta name="generator" content="vibrolock">'
 """How a page says what made it."""
+PARTS = ("looks", "painting", "hover", "zoom", "panel", "figure")
+"""Files of the script, in the order in which they use one another."""
 
 
 def document(page: Figure) -> str:
@@ -21,7 +23,8 @@ def document(page: Figure) -> str:
     shown as text.
     """
     contents = contents_of(page)
-    library, script = _file("uplot/uPlot.iife.min.js"), _file("figure.js")
+    library = _file("uplot/uPlot.iife.min.js")
+    script = '"use strict";\n(() => {\n' + "\n".join(_file(f"{name}.js") for name in PARTS) + "})();\n"
     return Template(_file("figure.html")).substitute(
         mark=MARK,
         title=escape(contents["title"] or "figure"),

@@ -9,7 +9,6 @@ from matplotlib.text import Text
 
 from rig.drawing.page import page_for
 from rig.drawing.style import restyle
-from tests.rig.monitor.browser.conftest import browser, chromium  # noqa: F401 (fixtures)
 from tests.rig.report.conftest import hostile, recordings  # noqa: F401 (fixtures)
 
 Draw = Callable[[Figure], None]

@@ -106,6 +106,10 @@ def test_every_kind_of_recording_has_a_figure_for_a_browser(recordings, tmp_path
         found = contents(tmp_path / f"{kind}.html")
         assert found["panels"], kind
         assert all(panel["shapes"] and "picture" not in panel for panel in found["panels"]), kind
+        told = [note for panel in found["panels"] for line in lines(panel) for note in line.get("notes", [])]
+        told += [line.get("name", "") for panel in found["panels"] for line in lines(panel)]
+        said = [re.search(r"point \d+: (good|warned)", note) for note in told]
+        assert any(said), kind
         assert (tmp_path / f"{kind}.html").stat().st_size < 1_500_000, kind
 
 

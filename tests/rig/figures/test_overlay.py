@@ -250,6 +250,8 @@ def test_the_command_lays_recordings_over_one_another(command, recordings, tmp_p
         ((one, "-o", "x.png", "--frequency", "24-25"), "--frequency 24-25: write both ends in Hz, such as 24:25.5"),
         ((one, "-o", "x.png", "--size", "wide"), "--size wide: write width and height in mm"),
         ((one, "-o", "x.png", "--style", "poster"), "--style poster: is none of screen, paper, slide"),
+        ((one, "-o", "x.html", "--style", "paper"), "--style paper: is for .png, .pdf and .svg; x.html fits itself"),
+        ((one, "-o", "x.html", "--size", "85"), "--size 85: is for .png, .pdf and .svg"),
         ((one, other, "-o", "x.png", "--lateness"), "--lateness: is drawn of one recording"),
     ):
         done = command("plot", *words)

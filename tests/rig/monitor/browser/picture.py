@@ -15,7 +15,7 @@ from PIL import Image
 
 from rig.monitor.process import PageServer
 from rig.monitor.sources import chosen
-from tests.rig.monitor.browser.conftest import Browser, started
+from tests.browsing import Browser, started
 
 LEVEL, STATE = "11 of 13", "recording"
 COMMAND = [sys.executable, "-c", "from rig.cli.app import main; main()", "run", "magnet-beam/backbone", "--realtime"]
