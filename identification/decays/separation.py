@@ -170,7 +170,7 @@ def _filter(one: _Found, others: Sequence[_Found]) -> tuple[int | None, str]:
         return least[1], ""
     return None, (
         f"{least[2]}; with {100.0 * one.decay / (2.0 * np.pi):.2g} % damping the filter cannot be narrower than "
-        f"{longest} periods let it be"
+        f"{longest} periods allow"
     )
 
 

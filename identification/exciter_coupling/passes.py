@@ -124,7 +124,7 @@ class Passes:
     def notes(self, reached: int, passes: int, change: float) -> list[str]:
         """Return remarks on a run, one line each."""
         if reached < self.n and passes > 1:
-            return [f"left all bounds in pass {passes} over the run, and in none before"]
+            return [f"diverged in pass {passes} over the run, and in none before"]
         if change > _TOLERANCE:
             return [
                 f"after {passes} passes the force still changed by {100.0 * change:.2g} %: the run is that uncertain"

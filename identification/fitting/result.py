@@ -45,7 +45,7 @@ MESSAGES = {
         "stopped at its limit of {limit} iterations while still improving: {of} lowered the {error} error by {gain:.2g} %"
     ),
     FitStatus.INTERRUPTED: "interrupted",
-    FitStatus.UNBOUNDED: "the sensitivities of the last iterate leave all bounds",
+    FitStatus.UNBOUNDED: "the sensitivities of the last iterate diverge",
     FitStatus.SINGULAR: "the normal equations of the last iterate could not be decomposed",
 }
 """Sentence of each status; what is in braces is filled in where the fit ends."""

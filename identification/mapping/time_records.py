@@ -135,7 +135,7 @@ def _raw_records(
     periods = {one.period_samples for one in found} - {0}
     if len(periods) > 1 or (periods and mapping.period_samples not in (None, *periods)):
         lengths = ", ".join(map(str, sorted({*periods, mapping.period_samples or 0} - {0})))
-        reason = f"disagree ({lengths}), wanted is one length of a period"
+        reason = f"disagree ({lengths}), expected one length of a period"
         raise IdentificationError(reason, where=where, field="period_samples")
     together = common_length(
         [one.values for one in found],

@@ -113,7 +113,9 @@ class BalancedModel(DynamicModel):
         for begin, end in ((low, high), (high, low)):
             path = followed(balance, begin, end, points=request.points, largest_use=allowed)
             if path is None:
-                more.append(f"at {begin:.4g} Hz no vibration was found that rest leads to within the range allowed")
+                more.append(
+                    f"at {begin:.4g} Hz no vibration was found that can be reached from rest within the range allowed"
+                )
                 continue
             found.append(path)
             if not path.note:
@@ -122,7 +124,7 @@ class BalancedModel(DynamicModel):
         if not found:
             raise IdentificationError(
                 f"at {request.level:g} {('V' if request.held == 'voltage' else 'N')} the model has no periodic vibration at "
-                f"{low:.4g} or {high:.4g} Hz that rest leads to within {allowed:g} times its range",
+                f"{low:.4g} or {high:.4g} Hz that can be reached from rest within {allowed:g} times its range",
                 field="force_n",
             )
         states, folds = [each.states(balance) for each in found], [each.folds(balance) for each in found]

@@ -267,7 +267,7 @@ def _request(
     given = {name: value for name, value in {"voltage_v": voltage_v, **options}.items() if value is not None}
     for name in given:
         if name not in model.options | _COMMON:
-            raise IdentificationError(f"means nothing to a {model.kind}; leave it out", field=name)
+            raise IdentificationError(f"does not apply to a {model.kind}; leave it out", field=name)
     force, voltage, band = given.pop("force", None), given.pop("voltage_v", None), given.pop("band_hz", (None, None))
     if force == "voltage":
         raise IdentificationError(

@@ -118,9 +118,7 @@ def validated(model: type[Model], table: Mapping[str, object], source: str) -> M
         raise invalid(error, model, where=source) from None
     except (ArithmeticError, MemoryError) as error:
         why = f"{type(error).__name__}: {error}"
-        raise ConfigurationError(
-            f"cannot be computed with, a number is far too large or small ({why})", where=source
-        ) from None
+        raise ConfigurationError(f"cannot be used: a number is far too large or small ({why})", where=source) from None
 
 
 def invalid(error: ValidationError, model: type[BaseModel], where: str = "") -> ConfigurationError:

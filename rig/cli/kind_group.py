@@ -110,7 +110,7 @@ class KindCommand(typer.core.TyperCommand):
             if not getattr(error, "possibilities", True) and hasattr(error, "option_name"):
                 known = ", ".join(max(one.opts, key=len) for one in self.params if one.param_type_name == "option")
                 vars(error).update(
-                    message=f"{error.option_name}: means nothing to `{ctx.command_path.strip()}`; allowed are {known}",
+                    message=f"{error.option_name}: does not apply to `{ctx.command_path.strip()}`; allowed are {known}",
                     possibilities=None,
                 )
             raise

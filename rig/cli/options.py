@@ -59,7 +59,7 @@ def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> Non
     from rig.errors import RecordingError
 
     if output.is_dir():
-        raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
+        raise RecordingError(f"{output}: is a folder, the name of a file is expected")
     if not output.parent.is_dir():
         raise RecordingError(f"{output}: there is no folder {output.parent}")
     if output.exists() and any(source.exists() and output.samefile(source) for source in sources):

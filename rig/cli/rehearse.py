@@ -64,7 +64,7 @@ def rehearse_(
         seed=seed,
     )
     if output is None:
-        raise typer.BadParameter("a file is wanted", param_hint="--output")
+        raise typer.BadParameter("a file is expected", param_hint="--output")
     if twin is not None:
         _write_twin(subject, twin, output, overwrite)
         return

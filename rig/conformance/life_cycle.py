@@ -22,7 +22,7 @@ class LifeCycleTests(DriverUnderTest):
     def test_nothing_is_opened_by_the_constructor(self) -> None:
         """A driver that was made and thrown away leaves no trace."""
         state = self.make().state
-        assert state is State.CLOSED, f"a driver that was only made is {state.value}"
+        assert state is State.CLOSED, f"a driver that was only constructed is {state.value}"
 
     def test_the_life_cycle_is_open_start_stop_close(self) -> None:
         """Every step leads to its state."""

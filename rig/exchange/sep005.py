@@ -45,7 +45,7 @@ def data_of_series(series: Sequence[Mapping[str, object]]) -> FileData:
     samplings = [_sampling(one, number) for number, one in enumerate(series)]
     rates = [sampling.rate_hz for sampling in samplings]
     if max(rates) / min(rates) - 1.0 > _SAME_RATE:
-        raise ImportFailed(f"series: sample rates from {min(rates):g} to {max(rates):g} Hz; wanted is one")
+        raise ImportFailed(f"series: sample rates from {min(rates):g} to {max(rates):g} Hz; expected one")
     stamps = [_instant(one, number) for number, one in enumerate(series)]
     first = min((stamp for stamp in stamps if stamp is not None), default=0.0)
     instants = [0.0 if stamp is None else stamp - first for stamp in stamps]
@@ -125,7 +125,7 @@ def _data(one: Mapping[str, object], number: int) -> Float:
 def _sampling(one: Mapping[str, object], number: int) -> EvenSampling:
     data, fs, time = _data(one, number), one.get("fs"), one.get("time")
     if fs is None and time is None:
-        raise ImportFailed(f"series[{number}].fs: is missing, and so is time; wanted is one of them")
+        raise ImportFailed(f"series[{number}].fs: is missing, and so is time; expected one of them")
     found = None if time is None else _of_instants(time, data)
     if time is not None and found is None:
         raise ImportFailed(

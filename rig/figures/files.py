@@ -44,7 +44,7 @@ def plot(
     sources = [source] if isinstance(source, Path) else list(source)
     check_ending(figure)
     if figure.is_dir():
-        raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
+        raise RecordingError(f"{figure}: is a folder, the name of a file is expected")
     if figure.exists() and any(one.exists() and figure.samefile(one) for one in sources):
         raise RecordingError(f"{figure}: is the file that is read; choose another name")
     if not overwrite:

@@ -199,7 +199,7 @@ def _rate(
         lowest_hz, highest_hz = allowed.rate_range_hz
         bounds["the device samples no faster" if lowest_hz < highest_hz else "it is the rate of the bench"] = highest_hz
     if not bounds:
-        return rate_hz, "nothing that bounds it was measured"
+        return rate_hz, "nothing that limits it was measured"
     why = min(bounds, key=bounds.__getitem__)
     bound = bounds[why]
     if allowed is not None and bound >= allowed.rate_range_hz[1]:

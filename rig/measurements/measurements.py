@@ -108,5 +108,5 @@ def _measured(recording: Recording, measurement: type, **options: object) -> obj
     campaign = KINDS.get(recording.kind)
     if campaign is None or measurement not in campaign.measurements:
         wanted = " or a ".join(kinds_that_yield(measurement))
-        raise RecordingError(f"the recording is a {recording.kind}, wanted is a {wanted}")
+        raise RecordingError(f"the recording is a {recording.kind}, expected a {wanted}")
     return campaign.measurements[measurement](recording, **options)

@@ -151,7 +151,7 @@ class Replay(Closing):
     def control(self, action: str, value: float) -> None:
         """Do what is asked on a page: ``pause``, ``play``, ``seek`` to a time in s, ``speed``; ValueError for anything else."""
         if not math.isfinite(value):
-            raise ValueError(f"{action} {value}: a number is wanted")
+            raise ValueError(f"{action} {value}: a number is expected")
         if action == "speed":
             try:
                 self.set_speed(value)
@@ -162,7 +162,7 @@ class Replay(Closing):
         elif action in ("pause", "play"):
             (self.pause if action == "pause" else self.play)()
         else:
-            raise InputError("pause, play, seek or speed is wanted", field=f"{action!r}")
+            raise InputError("pause, play, seek or speed is expected", field=f"{action!r}")
 
     def request_stop(self, cause: str) -> None:
         """Refuse by `RecordingError`: nothing moves."""

@@ -46,7 +46,7 @@ def write_arrays(
                 f"{path}: array name {name!r} must be letters, digits, underscores and / between groups"
             )
         if values.dtype.kind not in "biufcU":
-            raise RecordingError(f"{path}: array {name!r} is {values.dtype}; numbers or texts are wanted")
+            raise RecordingError(f"{path}: array {name!r} is {values.dtype}; numbers or texts are expected")
         if group := next((other for other in plain if other.startswith(f"{name}/")), None):
             raise RecordingError(f"{path}: array name {name!r} is also the group of {group!r}")
     with new_file(path, kept="nothing was changed") as (file, check):

@@ -98,9 +98,9 @@ def _check_storage(dataset: "h5py.Dataset", dtype: np.dtype) -> None:
     if dataset.is_virtual or dataset.external:
         raise RecordingError(f"{dataset.name} keeps its values in another file; allowed are values of its own")
     if dataset.shape is None or dtype.kind not in "biufcSO":
-        raise RecordingError("numbers or texts are wanted", field=dataset.name, value=dtype)
+        raise RecordingError("numbers or texts are expected", field=dataset.name, value=dtype)
     if dtype.kind == "O" and h5py.check_string_dtype(dtype) is None:
-        raise RecordingError(f"{dataset.name} holds lists or references; numbers or texts are wanted")
+        raise RecordingError(f"{dataset.name} holds lists or references; numbers or texts are expected")
     if dataset.size == 0:
         return
     if dataset.chunks is None:

@@ -39,14 +39,14 @@ def packed(dtype: np.dtype) -> np.dtype:
         RecordingError: not a structured dtype of plain numbers, or rows larger than 64 KiB.
     """
     if not dtype.names or not dtype.fields:
-        raise RecordingError(f"row dtype: {dtype} has no fields; a structured dtype is wanted")
+        raise RecordingError(f"row dtype: {dtype} has no fields; a structured dtype is expected")
     described: list[tuple[str, np.dtype, tuple[int, ...]]] = []
     for name in dtype.names:
         base, shape = dtype.fields[name][0].base.newbyteorder("<"), dtype.fields[name][0].shape
         if not _NAME.match(name):
             raise RecordingError(f"row dtype: field name {name!r} must be letters, digits and underscores")
         if base not in _SCALARS:
-            raise RecordingError(f"row dtype: field {name!r} is {base}; boolean, integer, float or complex is wanted")
+            raise RecordingError(f"row dtype: field {name!r} is {base}; boolean, integer, float or complex is expected")
         if 0 in shape:
             raise RecordingError(f"row dtype: field {name!r} of shape {shape} is empty")
         described.append((name, base, shape))
@@ -101,13 +101,13 @@ class Header:
         for name in ("kind", "software_version", "started", "identity"):
             text = getattr(self, name)
             if not isinstance(text, str) or not text or not text.isprintable():
-                raise RecordingError(f"header: {name} is {text!r}; a printable text is wanted")
+                raise RecordingError(f"header: {name} is {text!r}; a printable text is expected")
         for name, highest in (("seed", 2**64 - 1), ("first_part", 2**31 - 1)):
             number = getattr(self, name)
             if number is None and name == "seed":
                 continue
             if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number <= highest:
-                raise RecordingError(f"header: {name} is {number!r}; an integer from 0 to {highest} is wanted")
+                raise RecordingError(f"header: {name} is {number!r}; an integer from 0 to {highest} is expected")
         described = tuple(column.name for column in self.columns)
         if described != self.row_dtype.names:
             raise RecordingError(f"header: columns describe {described}, the rows hold {self.row_dtype.names}")

@@ -24,7 +24,7 @@ def encode(value: Mapping[str, object], *, what: str, indent: int | None = None)
         RecordingError: ``value`` is no mapping or holds something that JSON cannot hold.
     """
     if not isinstance(value, Mapping):
-        raise RecordingError(f"{what}: {type(value).__name__} given, a mapping is wanted")
+        raise RecordingError(f"{what}: {type(value).__name__} given, a mapping is expected")
     try:
         text = json.dumps(dict(value), default=_plain, ensure_ascii=False, indent=indent)
     except (TypeError, ValueError, RecursionError) as error:

@@ -85,7 +85,7 @@ class StoredTexts:
 
     def _texts(self, dataset: "h5py.Dataset") -> "h5py.Dataset":
         if dataset.dtype.kind not in "SO":
-            raise RecordingError("texts are wanted", field=dataset.name, value=dataset.dtype)
+            raise RecordingError("texts are expected", field=dataset.name, value=dataset.dtype)
         return dataset.asstr()
 
     def _read(self, dataset: "h5py.Dataset") -> Iterator[str]:

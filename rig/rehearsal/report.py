@@ -83,7 +83,7 @@ def not_computed_in_one_line(verdict: Verdict) -> str:
     if not missing.count:
         return ""
     why = "; ".join(f"{count} x {text}" for text, count in list(verdict.why_not_computed.items())[:MAX_REASONS])
-    out = f"{missing.count} of {missing.of} twins could not be computed ({why}), all shares are of the others"
+    out = f"{missing.count} of {missing.of} twins could not be computed ({why}); all shares are of the others"
     if missing.value > RELIABLE_MISSING:
         out += "; these are too many to rely on the verdict: give more measurements of the rig (--from) or narrower hypotheses"
     return out

@@ -55,5 +55,5 @@ def load_as(wanted: type[T], path: Path) -> T:
     name = next(name for name, kind in KINDS.items() if kind.loads(wanted))
     found = kind_of(path)
     if found != name:
-        raise RecordingError(f"{path}: is a file of kind {found}, wanted is one of kind {name}")
+        raise RecordingError(f"{path}: is a file of kind {found}, expected one of kind {name}")
     return cast(T, load(path))

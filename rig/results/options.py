@@ -114,7 +114,7 @@ class Options(Described):
     def _fault(cls, name: str, value: object) -> str:
         if name not in cls.names():
             known = ", ".join(f"`{field}`" for field in cls.names()) or "no such option"
-            return f"`{name}`: means nothing to {cls.takes or f'`kind` {cls.kind}, which takes'} {known}"
+            return f"`{name}`: does not apply to {cls.takes or f'`kind` {cls.kind}, which takes'} {known}"
         return f"`{name}` = {_shown(value)}: allowed {allowed(cls.model_fields[name])}"
 
 

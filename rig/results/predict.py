@@ -20,5 +20,5 @@ def predict_vibrations(model: Path, asked: Mapping[str, object], *, kind: str = 
     if (found := kind_of(model)) not in known:
         raise RecordingError(f"{model}: is a file of kind {found}; predictions are made with a {', '.join(known)}")
     if kind not in ("", found):
-        raise RecordingError(f"{model}: is a file of kind {found}, wanted is one of kind {kind}")
+        raise RecordingError(f"{model}: is a file of kind {found}, expected one of kind {kind}")
     return known[found].predict(model, known[found].options(**asked))

@@ -23,7 +23,7 @@ def check_figure(figure: Path, overwrite: bool) -> None:
     """Raise `RecordingError`, before anything moves, if a figure could not be written."""
     check_ending(figure)
     if figure.is_dir():
-        raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
+        raise RecordingError(f"{figure}: is a folder, the name of a file is expected")
     if not figure.parent.is_dir():
         raise RecordingError(f"{figure}: there is no folder {figure.parent}")
     if figure.exists() and not overwrite:

@@ -45,10 +45,10 @@ def agreement(row: Mapping[str, Any], paper: PaperError | None) -> str:
         return "The paper gives no number for this training set."
     if paper.mean is None or paper.standard_deviation is None:
         if unbounded:
-            return f"As in the paper, some are unstable: {unbounded} of {row['models']} models left all bounds."
+            return f"As in the paper, some are unstable: {unbounded} of {row['models']} models diverged."
         return "Other than in the paper, none is unstable."
     if mean is None:
-        return "Other than in the paper, every model left all bounds."
+        return "Other than in the paper, every model diverged."
     away = abs(mean - paper.mean)
     if away <= paper.standard_deviation:
         return "Agrees: within one standard deviation of the paper's models."

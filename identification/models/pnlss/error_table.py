@@ -27,7 +27,7 @@ class ModelTest:
     test: str
     experiment: str
     error: float
-    """Relative RMS error of the output; inf for a run that left all bounds."""
+    """Relative RMS error of the output; inf for a run that diverged."""
     range_use: float
     """Largest state or input over the largest in the training data; beyond 1 the model extrapolates."""
 

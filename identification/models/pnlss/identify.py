@@ -178,7 +178,7 @@ def _unstable(model: PnlssModel) -> list[str]:
     hz = abs(np.angle(worst)) * model.sample_rate_hz / (2.0 * np.pi)
     return [
         f"the linear part is unstable: at {hz:.4g} Hz small vibrations grow at a rate of "
-        f"{np.log(abs(worst)) * model.sample_rate_hz:.3g} 1/s, and long runs such as sweeps may leave all bounds"
+        f"{np.log(abs(worst)) * model.sample_rate_hz:.3g} 1/s, and long runs such as sweeps may diverge"
     ]
 
 

@@ -72,7 +72,7 @@ class DwellPlan(SettledPlan):
     @model_validator(mode="after")
     def _one_length(self) -> Self:
         if (self.cycles is None) == (self.duration_s is None):
-            raise InputError("exactly one of the two is to be given", field="cycles, duration_s")
+            raise InputError("exactly one of the two must be given", field="cycles, duration_s")
         if len(self.levels) != 1:
             raise InputError(f"{len(self.levels)} levels", field=self.levels_key, allowed="exactly 1")
         lowest_hz = self.controller.frequency_window_hz[0]

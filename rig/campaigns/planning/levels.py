@@ -62,7 +62,7 @@ class Levels(Configured):
     def _levels_make_sense(self) -> Self:
         given = list(self._given)
         if len(given) != 1:
-            raise InputError("exactly one of them is to be given", field=", ".join(LEVELS))
+            raise InputError("exactly one of them must be given", field=", ".join(LEVELS))
         if not self.levels:
             raise InputError("at least one level is needed", field=given[0], value=[])
         for index, level in enumerate(self.levels):

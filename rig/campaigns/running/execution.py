@@ -452,7 +452,7 @@ class Execution:
             down = "" if reason.is_trip else f"{reason.text}, but the driver failed at the end: "
             return f"{down}{self.loop.failure}"
         if self.failure is not None and not self.loop.cause:
-            return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
+            return f"stopped by an error outside the loop: {type(self.failure).__name__}: {self.failure}"
         if self.loop.cause and reason is EndReason.STOP_REQUESTED:
             return self.loop.cause
         return describe_end(self.tick.guard, self.bench)

@@ -17,7 +17,7 @@ def prepare_output(output: Path, overwrite: bool) -> None:
         if not output.parent.is_dir():
             raise RecordingError(f"{output.parent}: there is no such folder")
         if output.is_dir():
-            raise RecordingError(f"{output}: is a folder, the name of a file is wanted")
+            raise RecordingError(f"{output}: is a folder, the name of a file is expected")
         for path in (output, journal_path(output)):
             if path.exists() and not overwrite:
                 raise RecordingError(f"{path}: exists already; choose another name, or `overwrite`")

@@ -325,7 +325,7 @@ def _started(session: Session, settings: TickSettings, output: Path) -> Iterator
         yield session.start(settings)
         return
     bench, at = settings.bench, now()
-    text = f"a run into {output.absolute()} was under way at {at} and its end was never noted"
+    text = f"a run into {output.absolute()} was under way at {at} and its end was never recorded"
     remember(bench, trip=RememberedTrip(at, text, ""))
     try:
         loop = session.start(settings)

@@ -29,7 +29,7 @@ SAMPLES = 256  # of a period
 BESIDE_THE_LEVEL = {
     EndReason.NON_FINITE_INPUT: ("the device delivered no number", "look at device and driver, then `rig check`"),
     EndReason.NON_FINITE_OUTPUT: (
-        "the control law left all bounds",
+        "the control law diverged",
         "look at the gains of the controller, or have them made by `rig tune`",
     ),
     EndReason.DRIVER_FAILED: ("device, wire or driver, not the level", "see that `rig doctor --daq BENCH` answers"),

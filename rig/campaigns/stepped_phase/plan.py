@@ -60,7 +60,7 @@ class SteppedPhasePlan(SettledPlan):
     def _lags_make_sense(self) -> Self:
         given = [name for name in ("start_deg", "stop_deg") if getattr(self, name) is not None]
         if (self.phase_lags_deg is not None) == bool(given) or len(given) == 1:
-            raise ValueError("phase_lags_deg, or start_deg and stop_deg: exactly one of the two is to be given")
+            raise ValueError("phase_lags_deg, or start_deg and stop_deg: exactly one of the two must be given")
         low, high = LAGS_DEG
         named = [(name, getattr(self, name)) for name in (*given, "approach_deg")]
         named += [(f"phase_lags_deg[{index}]", lag) for index, lag in enumerate(self.phase_lags_deg or ())]

@@ -62,7 +62,7 @@ class SteppedSinePlan(TonePlan):
         if (self.frequencies_hz is None) == (self.start_hz is None) or (self.start_hz is None) != (
             self.stop_hz is None
         ):
-            raise InputError("exactly one of it and of start_hz with stop_hz is to be given", field="frequencies_hz")
+            raise InputError("exactly one of this and of start_hz with stop_hz must be given", field="frequencies_hz")
         for index, frequency_hz in enumerate(self.frequencies_hz or ()):
             InputError.unless_above(f"frequencies_hz[{index}]", frequency_hz, 0)
         if not self.frequencies_at_each_level:

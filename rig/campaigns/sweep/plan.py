@@ -53,7 +53,7 @@ class SweepPlan(TonePlan):
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
         if (self.rate_hz_per_s is None) == (self.rate_octaves_per_min is None):
-            raise InputError("exactly one of the two is to be given", field="rate_hz_per_s, rate_octaves_per_min")
+            raise InputError("exactly one of the two must be given", field="rate_hz_per_s, rate_octaves_per_min")
         if self.start_hz == self.stop_hz:
             raise InputError(field="stop_hz", value=self.stop_hz, allowed="anything but start_hz")
         mean_hz = 0.5 * (self.start_hz + self.stop_hz)

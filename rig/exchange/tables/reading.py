@@ -32,7 +32,7 @@ def read_table(path: Path, layout: CsvLayout | None = None) -> FileData:
     try:
         heading, rest = _split(blocks(path, "utf-8-sig" if encoding == "utf-8" else encoding), layout)
         if heading is None:
-            raise ImportFailed("holds no table; wanted is a line of names, then rows of numbers")
+            raise ImportFailed("holds no table; expected a line of names, then rows of numbers")
         numbers = _columns(heading.columns, rest, layout.skip_last_lines)
     except ImportFailed as error:
         if str(error).startswith(str(path)):

@@ -30,7 +30,7 @@ def modes_in(file: UniversalFile, assumed: str = "", drive: str = "") -> LinearM
             raise ImportFailed(f"{mode.where}: its nodes are not those of the first mode")
         if np.iscomplexobj(mode.shape) or mode.modal_mass <= 0.0:
             raise ImportFailed(
-                f"{mode.where}: modal mass {mode.modal_mass:g}, wanted is a real shape and a modal mass above zero; "
+                f"{mode.where}: modal mass {mode.modal_mass:g}, expected a real shape and a modal mass above zero; "
                 "export the modes with their modal masses"
             )
     columns = np.array([np.real(mode.shape) for mode in modes])  # mode, direction, node

@@ -100,7 +100,7 @@ def _matrix(functions: Sequence[Function], units: FileUnits, notes: tuple[str, .
         output, source = _names(function)
         if (output, source) in paths:
             raise ImportFailed(
-                f"{where}: a second response of {output} to {source} in load case {function.load_case}; wanted is one"
+                f"{where}: a second response of {output} to {source} in load case {function.load_case}; expected one"
             )
         value, channels = _path(function, units, output, source)
         paths[output, source] = value
@@ -133,7 +133,7 @@ def _check_complete(paths: Mapping[tuple[str, str], Complex], outputs: Iterable[
     sources = list(inputs)
     if missing := [f"{o} to {i}" for o in outputs for i in sources if (o, i) not in paths]:
         raise ImportFailed(
-            f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs"
+            f"frequency responses: there is none of {', '.join(missing)}; expected all outputs to all inputs"
         )
 
 
@@ -146,7 +146,7 @@ def _path(function: Function, units: FileUnits, output: str, source: str) -> tup
     out_unit, in_unit, factor = units.of_response(function)
     if not np.iscomplexobj(function.data):
         raise ImportFailed(
-            f"{function.where}: the frequency response is stored as real numbers; wanted are complex ones, with their phases"
+            f"{function.where}: the frequency response is stored as real numbers; expected complex ones, with their phases"
         )
     value = np.asarray(function.data, dtype=np.complex128) * factor
     if roles := re.match(r"(\w+) / (\w+), estimator", function.lines[4]):

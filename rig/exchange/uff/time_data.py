@@ -153,7 +153,7 @@ def _side_by_side(name: str, records: Sequence[_Signal]) -> NDArray[np.generic]:
     for one in records:
         where, length = one.function.where, len(one.values)
         if abs(length - size) > _MAX_DIFFERENCE * size:
-            raise ImportFailed(f"{where}: {name} has {length} samples, before {size}; wanted are records of one length")
+            raise ImportFailed(f"{where}: {name} has {length} samples, before {size}; expected records of one length")
         if abs(one.rate_hz / first.rate_hz - 1.0) > _SAME_RATE:
             raise ImportFailed(f"{where}: sample rate {one.rate_hz:g} Hz, that of the first is {first.rate_hz:g} Hz")
     shortest = min(len(one.values) for one in records)
@@ -187,7 +187,7 @@ def _sampling(function: Function) -> tuple[float, float]:
             raise ImportFailed(f"{function.where}: its instants are not evenly spaced; resample it")
         return found.rate_hz, found.start_s
     if step <= 0.0:
-        raise ImportFailed(f"{function.where}: is not evenly sampled; wanted is a step above zero")
+        raise ImportFailed(f"{function.where}: is not evenly sampled; expected a step above zero")
     start = float(function.x[0]) * seconds if function.x.size else 0.0
     rate = 1.0 / step
     stated = re.match(r"sample rate (\S+) Hz", function.lines[4])

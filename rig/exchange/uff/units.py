@@ -197,7 +197,7 @@ def _abscissa(function: Function, code: int, what: str, allowed: dict[str, float
         return float(found.factor) * allowed[found.si]
     if axis.unit or axis.data_type not in (0, 1, code):
         said = f"in '{axis.unit}'" if axis.unit else f"of data type {axis.data_type}"
-        raise ImportFailed(f"{function.where}: the abscissa is {said}, wanted is a {what} in {' or '.join(allowed)}")
+        raise ImportFailed(f"{function.where}: the abscissa is {said}, expected a {what} in {' or '.join(allowed)}")
     return 1.0
 
 
@@ -206,6 +206,6 @@ def file_units(file: UniversalFile, assumed: str = "") -> FileUnits:
     factors = {(system.length, system.force) for system in file.units}
     if len(factors) > 1 or any(length <= 0.0 or force <= 0.0 for length, force in factors):
         raise ImportFailed(
-            f"units (dataset 164): {len(factors)} different ones, {sorted(factors)}; wanted is one, above zero"
+            f"units (dataset 164): {len(factors)} different ones, {sorted(factors)}; expected one, above zero"
         )
     return FileUnits(file.units[0] if file.units else None, assumed)

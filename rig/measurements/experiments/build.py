@@ -83,7 +83,7 @@ def experiments(
         If no data is left, a channel does not exist, or the rate does not fit.
     """
     if recording.kind not in (kinds := kinds_with_experiments()):
-        raise RecordingError(f"{recording.path}: holds a {recording.kind}, wanted is a {' or a '.join(kinds)}")
+        raise RecordingError(f"{recording.path}: holds a {recording.kind}, expected a {' or a '.join(kinds)}")
     IdentificationError.unless_one_of("periods", periods, get_args(Periods))
     if transient_periods is not None and not 0.0 <= transient_periods < math.inf:
         raise IdentificationError(field="transient_periods", value=transient_periods, allowed="zero or more")

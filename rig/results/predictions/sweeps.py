@@ -76,7 +76,7 @@ def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
     """Predict every sweep of a recording; raise `RecordingError` if the file has other contents."""
     with Recording(path) as recording:
         if recording.kind not in kinds_that_yield(Transient):
-            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
+            raise RecordingError(f"{path}: holds a {recording.kind}, expected a sweep recording")
         notes = strangers(bench_of_recording(recording), models.mode.specimen, models.exciter, str(path))
         recorded = sweeps(recording)
         rejected = set(recording.latest) - set(recorded)
@@ -106,7 +106,7 @@ def planned(plan_source: str) -> SweepPlan:
     """Load a plan of sweeps at constant voltage; raise `ConfigurationError` for any other plan."""
     plan = load_plan(plan_source)
     if not isinstance(plan, SweepPlan):
-        raise ConfigurationError(f"{plan_source}: is a plan of kind {plan.kind}, wanted is a sweep")
+        raise ConfigurationError(f"{plan_source}: is a plan of kind {plan.kind}, expected a sweep")
     if plan.level_unit != "V":
         raise ConfigurationError(
             f"{plan_source}: has levels in {plan.level_unit}, whose voltage only the test can tell; give levels_v"

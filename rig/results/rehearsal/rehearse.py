@@ -114,7 +114,7 @@ def rehearse_into(
     if output.exists() and not overwrite:
         raise RecordingError(f"{output}: exists already; choose another name, or `overwrite`")
     if output.is_dir() or not output.parent.is_dir():
-        raise RecordingError(f"{output}: is a folder, or in none; the name of a file is wanted")
+        raise RecordingError(f"{output}: is a folder, or in none; the name of a file is expected")
     journal = draws_path(output)
     if overwrite and output.exists():
         discard_draws(journal)

@@ -36,7 +36,7 @@ def simulated_multisines(
     for path in paths:
         with Recording(path) as recording:
             if recording.kind not in kinds_that_yield(PeriodicSpectra):
-                raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a multisine recording")
+                raise RecordingError(f"{path}: holds a {recording.kind}, expected a multisine recording")
             found = experiments(
                 recording,
                 inputs=[channel.name for channel in driving(model.inputs, constants)],
@@ -63,7 +63,7 @@ def planned_multisines(
     """
     plan = load_plan(source)
     if not isinstance(plan, MultisinePlan):
-        raise ConfigurationError(f"{source}: is a plan of kind {plan.kind}, wanted is a multisine")
+        raise ConfigurationError(f"{source}: is a plan of kind {plan.kind}, expected a multisine")
     bench = bench_of(plan, source)
     samples = _period_samples(source, plan, model.sample_rate_hz)
     ahead = max(plan.transient_periods, 1)

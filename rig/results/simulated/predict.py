@@ -134,7 +134,7 @@ def _check(request: SimulatedPrediction, model: DrivenModel, path: Path) -> None
         raise ConfigurationError(f"`exciter`: is inside {path}, whose input is the voltage; leave it out")
     if request.exciter is not None and not (steady or swept or request.planned_multisines):
         raise ConfigurationError(
-            "`exciter`: means nothing to `multisines`, which takes the recorded force; leave it out"
+            "`exciter`: does not apply to `multisines`, which takes the recorded force; leave it out"
         )
 
 

@@ -67,7 +67,7 @@ class SimulatedSweepModels:
         if unbounded_at_s is not None:
             beyond = np.flatnonzero(~(np.abs(signals[1]) <= _SHOWN * given.largest))
             stop = int(beyond[0]) if beyond.size else stop
-            notes.append(f"the run left all bounds {unbounded_at_s:.2f} s into the sweep: no errors are given")
+            notes.append(f"the run diverged {unbounded_at_s:.2f} s into the sweep: no errors are given")
         elif run.range_use > 1.0:
             what = "states or input" if isinstance(model, PnlssModel) else "elements"
             notes.append(f"{what} reach {run.range_use:.2f} times the training data: extrapolated")

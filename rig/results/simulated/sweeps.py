@@ -36,7 +36,7 @@ def recorded_simulated_sweeps(path: Path, models: SimulatedSweepModels) -> Itera
     """
     with Recording(path) as recording:
         if recording.kind not in kinds_that_yield(Transient):
-            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a sweep recording")
+            raise RecordingError(f"{path}: holds a {recording.kind}, expected a sweep recording")
         notes = (
             *strangers(bench_of_recording(recording), models.model.specimen, models.exciter, str(path)),
             *points_left_out(recording),

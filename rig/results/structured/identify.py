@@ -62,5 +62,5 @@ def identify(
 def _modes_in(path: Path) -> LinearModes:
     if not path.exists() or (kind := kind_of(path)) != "linear-modes":
         what = f"is a file of kind {kind}" if path.exists() else "does not exist"
-        raise RecordingError(f"{path}: {what}, wanted are {MODES_OF_A_STRUCTURE}")
+        raise RecordingError(f"{path}: {what}, expected {MODES_OF_A_STRUCTURE}")
     return load_as(ModalAnalysis, path).modes

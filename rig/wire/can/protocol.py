@@ -229,7 +229,7 @@ def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None
         wanted, found = message.canonical.split(" ", 1)[1], other.canonical.split(" ", 1)[1]
         if wanted != found:
             raise ConfigurationError(
-                f"message {name}: is [{_short(found, wanted)}], wanted is [{_short(wanted, found)}]", where=dbc
+                f"message {name}: is [{_short(found, wanted)}], expected [{_short(wanted, found)}]", where=dbc
             )
         if other.frame_id & NODE_MASK:
             raise ConfigurationError(

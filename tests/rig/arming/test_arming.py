@@ -389,7 +389,7 @@ def failing_at_stop(real, session, settings):
 def test_while_something_physical_runs_that_is_remembered_and_an_orderly_end_takes_it_back(monkeypatch):
     started = Started(monkeypatch, as_ever)
     with rig.run(PLAN, bench=bench(), arm=True):
-        assert "its end was never noted" in started.seen[0].text
+        assert "its end was never recorded" in started.seen[0].text
         assert memory_of(bench()).trip is None
 
 

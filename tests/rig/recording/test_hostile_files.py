@@ -96,7 +96,7 @@ def many_texts(file):
         (external_storage, "/arrays/b keeps its values in another file"),
         (named_type, "/arrays/b is a Datatype; allowed are groups and datasets"),
         (references, "/arrays/b holds lists or references"),
-        (compound, "numbers or texts are wanted"),
+        (compound, "numbers or texts are expected"),
         (empty_space, "/arrays/b declares 1220704 chunks and stores 0"),
         (nothing_stored, "/arrays/b declares 8000000 bytes and stores 0"),
         (bomb, "its datasets declare .* bytes in a file of .*; allowed are 200 times its size"),

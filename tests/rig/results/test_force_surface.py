@@ -108,7 +108,10 @@ def test_its_levels_are_exported_as_the_frequency_responses_that_they_are(made, 
     ("line", "said"),
     [
         ("identify reference.h5 --model force-surface -o x.h5", "'closed form' held force, must hold the response"),
-        ("identify held.h5 --model force-surface --count 2 -o x.h5", "--count: means nothing to --model force-surface"),
+        (
+            "identify held.h5 --model force-surface --count 2 -o x.h5",
+            "--count: does not apply to --model force-surface",
+        ),
         (
             "identify surface.h5 --model force-surface -o x.h5",
             "holds a force-surface; a force surface comes from respon",
@@ -116,9 +119,9 @@ def test_its_levels_are_exported_as_the_frequency_responses_that_they_are(made, 
         ("predict surface.h5 --frequency-response 9 -o x.h5", "force_n = 9 N: levels at lag"),
         (
             "predict surface.h5 --frequency-response 0.6 --force rms -o x.h5",
-            "--force: means nothing to a force surface",
+            "--force: does not apply to a force surface",
         ),
-        ("predict surface.h5 --sweep held.h5 -o x.h5", "--sweep: means nothing to a force surface"),
+        ("predict surface.h5 --sweep held.h5 -o x.h5", "--sweep: does not apply to a force surface"),
         ("predict surface.h5 --reference held.h5 -o x.h5", "'0.5 mm' is not at constant force"),
         ("predict surface.h5 -o x.h5", "nothing to predict: give --frequency-response"),
     ],

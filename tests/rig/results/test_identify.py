@@ -94,7 +94,7 @@ def test_points_that_were_not_accepted_are_counted_in_a_note(
     [
         ("exciter.h5 modal.h5 --model exciter", "2 files given, allowed is one multisine recording"),
         ("backbone.h5 --model exciter", "holds a backbone; an exciter model comes from a multisine"),
-        ("exciter.h5 --model exciter --modes LIN.h5", "--modes: means nothing to --model exciter, which takes --band"),
+        ("exciter.h5 --model exciter --modes LIN.h5", "--modes: does not apply to --model exciter, which takes --band"),
         ("exciter.h5 --model exciter --band 100 50", "--band = 100 50"),
         ("exciter.h5 --model exciter --resistance 0", "--resistance = 0: allowed is any number above 0"),
         (
@@ -104,7 +104,7 @@ def test_points_that_were_not_accepted_are_counted_in_a_note(
         ("exciter.h5 --model exciter --amplifier-gain 2", "--amplifier-gain: is for the resistance; add --resistance"),
         (
             "modal.h5 --model linear --resistance 3",
-            "--resistance: means nothing to --model linear, which takes --estimator",
+            "--resistance: does not apply to --model linear, which takes --estimator",
         ),
         ("exciter.h5 --model exciter --band 20 22", "9 excited lines in 20 to 22 Hz; allowed: at least 20"),
         ("exciter.h5 --model shaker", "--model = 'shaker'"),

@@ -122,4 +122,4 @@ def test_its_options_stand_in_its_help_and_in_messages(there):
     assert (other.status, other.err.count("\n")) == (2, 1)
     assert "allowed are --output, --damping-ratio" in other.err
     flat = there("identify sine.h5 --model oscillator --states 2 -o o.h5")
-    assert flat.err == "rig: --states: means nothing to --model oscillator, which takes --damping-ratio\n"
+    assert flat.err == "rig: --states: does not apply to --model oscillator, which takes --damping-ratio\n"

@@ -290,8 +290,8 @@ def test_progress_says_which_start_is_compared(capsys):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("identify lines.h5 --model linear --states 2", "--states: means nothing to --model linear"),
-        ("identify lines.h5 --model pnlss --count 2", "--count: means nothing to --model pnlss, which takes --states"),
+        ("identify lines.h5 --model linear --states 2", "--states: does not apply to --model linear"),
+        ("identify lines.h5 --model pnlss --count 2", "--count: does not apply to --model pnlss, which takes --states"),
         ("identify lines.h5 --model pnlss --degrees 1,3", "--degrees = '1,3': allowed are whole numbers from 2 to 12"),
         ("identify lines.h5 --model pnlss --input current", "--input = 'current': allowed are force, voltage"),
         ("identify lines.h5 --model pnlss --rate 0", "--rate = 0: allowed is any number above 0"),
@@ -329,7 +329,7 @@ def test_progress_says_which_start_is_compared(capsys):
             "identify lines.h5 --model pnlss --saturating 2 --function mine:g",
             "--function = mine:g: is code, and is not imported unless you trust it: --trust-code",
         ),
-        ("identify lines.h5 --model linear --constant-input", "--constant-input: means nothing to --model linear"),
+        ("identify lines.h5 --model linear --constant-input", "--constant-input: does not apply to --model linear"),
         ("predict F.h5 --multisine lines.h5 --constant force=1", "--constant: hold all inputs of F.h5"),
         (
             "predict F.h5 --planned-multisine magnet-beam/multisine-1",
@@ -347,13 +347,13 @@ def test_progress_says_which_start_is_compared(capsys):
             f"predict F.h5 --planned-sweep {SWEEP_PLAN}",
             "--planned-sweep: gives a voltage, and F.h5 is driven by a force; add --exciter",
         ),
-        ("predict F.h5 --multisine lines.h5 --exciter F.h5", "--exciter: means nothing to --multisine"),
-        ("predict F.h5 --sweep lines.h5", "lines.h5: holds a multisine, wanted is a sweep recording"),
-        ("predict F.h5 --multisine sweep.h5", "sweep.h5: holds a sweep, wanted is a multisine recording"),
-        ("predict F.h5 --frequency-response 0.1 --modes F.h5", "--modes: means nothing to a PNLSS model"),
+        ("predict F.h5 --multisine lines.h5 --exciter F.h5", "--exciter: does not apply to --multisine"),
+        ("predict F.h5 --sweep lines.h5", "lines.h5: holds a multisine, expected a sweep recording"),
+        ("predict F.h5 --multisine sweep.h5", "sweep.h5: holds a sweep, expected a multisine recording"),
+        ("predict F.h5 --frequency-response 0.1 --modes F.h5", "--modes: does not apply to a PNLSS model"),
         (
             "predict F.h5 --sweep sweep.h5 --exciter F.h5",
-            "F.h5: is a file of kind pnlss, wanted is one of kind exciter",
+            "F.h5: is a file of kind pnlss, expected one of kind exciter",
         ),
         (
             "predict F.h5 --frequency-response 0.1 --force rms",

@@ -321,25 +321,25 @@ def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
         ),
         (
             "identify lines.h5 --model structured --modes no.h5",
-            "no.h5: does not exist, wanted are the modes with which",
+            "no.h5: does not exist, expected the modes with which",
         ),
         (
             "identify lines.h5 --model structured --modes low.h5",
-            "low.h5: is a file of kind multisine, wanted are the modes",
+            "low.h5: is a file of kind multisine, expected the modes",
         ),
         (
             "identify lines.h5 --model structured --modes modes.h5 --states 2",
-            "--states: means nothing to --model structured",
+            "--states: does not apply to --model structured",
         ),
         (
             "identify lines.h5 --model structured --modes modes.h5 --input force",
-            "--input: means nothing to --model struct",
+            "--input: does not apply to --model struct",
         ),
         (
             "identify lines.h5 --model structured --modes modes.h5 --resume",
-            "--resume: means nothing to --model structured",
+            "--resume: does not apply to --model structured",
         ),
-        ("identify lines.h5 --model pnlss --laws iwan", "--laws: means nothing to --model pnlss"),
+        ("identify lines.h5 --model pnlss --laws iwan", "--laws: does not apply to --model pnlss"),
         (
             "identify lines.h5 --model structured --modes modes.h5 --laws magic",
             "--laws = 'magic': allowed are polynomial-spring, ",
@@ -364,15 +364,15 @@ def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
             "identify lines.h5 --model structured --modes modes.h5 --scatter gain",
             "--scatter: needs two recordings at least",
         ),
-        ("identify lines.h5 --model linear --scatter gain", "--scatter: means nothing to --model linear"),
+        ("identify lines.h5 --model linear --scatter gain", "--scatter: does not apply to --model linear"),
         ("identify lines.h5 --model structured --modes modes.h5 --hold-out 2", "no level has more than 2 realisations"),
         (
             "predict S.h5 --frequency-response 1 --modes modes.h5",
-            "--modes: means nothing to a structured model, which answers",
+            "--modes: does not apply to a structured model, which answers",
         ),
         (
             "predict S.h5 --frequency-response 1 --allow-extrapolation",
-            "--allow-extrapolation: means nothing to a structu",
+            "--allow-extrapolation: does not apply to a structu",
         ),
         (
             "predict S.h5 --multisine lines.h5 --bands",
@@ -384,10 +384,10 @@ def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
             "predict S.h5 --voltage-response 1",
             "--voltage-response: gives a voltage, and S.h5 is driven by a force; add --e",
         ),
-        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to --multisine"),
+        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: does not apply to --multisine"),
         (
             "predict S.h5 --frequency-response 1 --exciter S.h5",
-            "S.h5: is a file of kind structured, wanted is one of kin",
+            "S.h5: is a file of kind structured, expected one of kin",
         ),
         ("predict S.h5 --multisine modes.h5", "modes.h5: "),
         ("predict modes.h5 --multisine lines.h5", "predictions are made with a nonlinear-mode, pnlss, structured, "),

@@ -82,7 +82,7 @@ class Blocks:
         return np.asarray(self._s[0])
 
     def __iter__(self) -> Iterator[bool]:
-        """Yield True for each block; False at the end of a run that leaves all bounds. Possible only once."""
+        """Yield True for each block; False at the end of a run that diverges. Possible only once."""
         for begin, end in pairwise(self._edges()):
             self._resize(end - begin)
             u, y = self._record.u[begin:end], self._record.y[begin:end]

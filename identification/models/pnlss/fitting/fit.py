@@ -184,7 +184,7 @@ def _state_scale(start: PnlssModel, experiments: Sequence[Experiment]) -> Float:
         what = f"experiments[{index}]{f' ({experiment.name})' if experiment.name else ''}"
         if run.unbounded_at is not None:
             raise IdentificationError(
-                f"leaves all bounds at sample {run.unbounded_at} of {what}",
+                f"diverges at sample {run.unbounded_at} of {what}",
                 field="start",
                 allowed="a model that is stable there",
             )

@@ -70,7 +70,7 @@ def _line_weights(settings: FitSettings, record: Record, sample_rate_hz: float) 
 def transformed(record: Record, lines: Float, blocks: Blocks) -> Iterator[tuple[Float, Float]] | None:
     """For each output the Jacobian float[2 n_used, n_columns] of its lines, and rows float[2 n_used, n_own].
 
-    Periods are averaged first; real parts stand above imaginary ones, all weighted. None if the run leaves all bounds.
+    Periods are averaged first; real parts stand above imaginary ones, all weighted. None if the run diverges.
     """
     periods = (len(record.u) - record.counted_from) // record.period
     jacobian = np.zeros((record.period, len(lines), blocks.columns))

@@ -49,7 +49,7 @@ class Sums:
         """Sensitivities of the state after the piece."""
 
     def add(self, blocks: Blocks) -> bool:
-        """Add all samples; return False if the run leaves all bounds."""
+        """Add all samples; return False if the run diverges."""
         (own, outputs, columns), n = self.mixed.shape, len(self.after)
         linear = blocks.linear if outputs > 1 else 0
         wide = linear // n
@@ -80,7 +80,7 @@ class Sums:
         before[:] = 0.0
 
     def add_lines(self, blocks: Blocks, record: Record, lines: Float) -> bool:
-        """Add all frequency lines; return False if the run leaves all bounds."""
+        """Add all frequency lines; return False if the run diverges."""
         found = transformed(record, lines, blocks)
         if found is None:
             return False
@@ -93,7 +93,7 @@ class Sums:
 
 
 def summed(system: System, record: Record, x: Float, weights: Float, span: tuple[int, int]) -> Sums | None:
-    """Sum over the samples ``span`` of a record that begins with state ``x``; None if the run leaves all bounds."""
+    """Sum over the samples ``span`` of a record that begins with state ``x``; None if the run diverges."""
     with np.errstate(all="ignore"):
         of: Derivatives = "all" if span[0] or record.place is not None else "parameters"
         blocks = Blocks(system, record, weights, state_after(system, record.u[: span[0]], x), span, of)

@@ -69,4 +69,4 @@ def test_a_dry_run_writes_nothing_and_a_run_wants_a_file(command, place, monkeyp
     assert not (place / "run.h5").exists()
     status, out, err = command("run magnet-beam/backbone")
     assert (status, out) == (2, "")
-    assert "--output: a file is wanted, or --dry-run" in err
+    assert "--output: a file is needed, or --dry-run" in err

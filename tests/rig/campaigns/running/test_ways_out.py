@@ -188,7 +188,7 @@ def test_whoever_watches_may_leave_the_rig_comes_down_first(monkeypatch, tmp_pat
     (made, output) = telltale(monkeypatch), tmp_path / "run.h5"
     with refused(SystemExit, "enough-seen"):
         rig.run(PLAN, bench=slow_bench("virtual"), output=output, progress=Impatient())
-    assert ending(output)["text"] == "stopped by an error beside the loop: SystemExit: enough seen"
+    assert ending(output)["text"] == "stopped by an error outside the loop: SystemExit: enough seen"
     assert made[0].outputs[-1] == 0.0
     assert made[0].zeros_at_the_end >= 1
 
