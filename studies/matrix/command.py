@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench import Bench, load_bench
+from rig.show.waiting import heard
 from rig.text.console import print_json
 from studies.matrix.measuring import device_row, matrix_rows
 from studies.matrix.rows import read_rows, write_rows
@@ -28,6 +29,7 @@ def compare(
     for row in matrix_rows(load_bench(MATRIX_BENCH), firmware, verify=verify):
         rows.append(row)
         print(f"measured: {row.way}", file=sys.stderr, flush=True)
+        heard()
     if output is not None:
         write_rows(output, rows)
     if json:

@@ -11,6 +11,7 @@ import typer
 
 from rig.cli.options import Json
 from rig.errors import ConfigurationError
+from rig.show.waiting import heard
 
 
 def reproduce_(
@@ -143,3 +144,4 @@ def _reference(
 def _say(line: str) -> None:
     with contextlib.suppress(OSError):  # the reader has closed the stream; the study goes on
         print(line, file=sys.stderr, flush=True)
+    heard()
