@@ -41,7 +41,7 @@ def test_channels_are_mapped_by_name_whatever_their_order() -> None:
     mode = nonlinear_mode(BACKBONE, modes=linear_modes())
     np.testing.assert_allclose(mode.damping_ratio, 0.004, rtol=1e-9)
     np.testing.assert_allclose(mode.mac, 1.0, rtol=1e-12)
-    assert all("only: intervals" in note for note in mode.notes)
+    assert all("only: the intervals" in note for note in mode.notes)
     found, tested, _ = shapes_for(linear_modes(), BACKBONE)
     assert (found.channels, tested) == (("drive", "tip"), 0)
     np.testing.assert_array_equal(found.tested, SHAPE)

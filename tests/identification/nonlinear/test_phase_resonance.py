@@ -89,7 +89,7 @@ def test_mass_normalised_shapes_give_the_same_modal_amplitude_as_the_drive_point
     assert mode.damping_ratio[0] == pytest.approx(0.004, rel=1e-12)
     assert mode.modal_amplitude[0] == pytest.approx(one_mode_point().amplitude_m / PHI, rel=1e-12)
     assert mode.mac[0] == pytest.approx(1.0, rel=1e-12)
-    assert all("only: intervals" in note for note in mode.notes)
+    assert all("only: the intervals" in note for note in mode.notes)
 
 
 def test_modal_amplitude_sums_the_squares_of_the_modes_in_the_shape() -> None:

@@ -138,7 +138,7 @@ def test_steady_peaks_are_those_of_the_rig(there, force_model):
     response = told["frequency_responses"][0]
     truth = constant_force_response(VirtualRig.shipped("magnet-beam"), 0.05)
     assert response["force"] == "pure-sine"
-    assert any("force without harmonics" in note for note in told["notes"])
+    assert any("force held constant has no harmonics" in note for note in told["notes"])
     assert response["peak_m"] == pytest.approx(np.abs(truth.drive_harmonics_m[:, 1]).max(), rel=0.05)
 
 

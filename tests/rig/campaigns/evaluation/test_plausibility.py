@@ -157,7 +157,7 @@ def test_a_single_response_that_is_late_is_named():
     found = judged(late(0.0, 60.0))
     assert not found.accepted
     assert found.reason == (
-        "channel acc_magnet stands 60 deg ahead of the drive channel, expected 0 by the mode shapes, refused from 45 deg: "
+        "channel acc_magnet is 60 deg ahead of the drive channel, expected 0 by the mode shapes, refused from 45 deg: "
         "look at what delays or advances one of the two sensors (conditioner, filter, skew_samples)"
     )
 

@@ -117,7 +117,7 @@ def test_channels_over_an_angle_have_no_rate(tmp_path):
         file.groups[0].channels[0].sync_type = 2
         file.groups[0].channels[0].name = "angle"
         file.save(tmp_path / "x.mf4")
-    assert "no time" in read_mdf4(tmp_path / "x.mf4").channels["F"].unread
+    assert "not a time" in read_mdf4(tmp_path / "x.mf4").channels["F"].unread
 
 
 def test_units_of_tdms_may_have_other_names(tmp_path):
