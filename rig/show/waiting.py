@@ -54,6 +54,7 @@ class Waiting:
 
     def __init__(self, what: str, usual: str | Callable[[], str] = "", *, announced: bool = False) -> None:
         self._what, self._usual, self._announced = what, usual, announced
+        self._spoken = False
         self._began_s = time.monotonic()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="waiting", daemon=True)
@@ -85,14 +86,15 @@ class Waiting:
             self._print(text)
 
     def _watch(self) -> None:
-        longest_s = FURTHER_S if self._announced else FIRST_S
         while not self._over.wait(0.1):
             silent_s = time.monotonic() - _Silence.since_s
+            longest_s = FURTHER_S if self._spoken else FIRST_S
             if not _Silence.wanted and _Silence.waiting[-1:] == [self] and silent_s >= longest_s:
                 self._say()
-                longest_s = FURTHER_S
 
     def _say(self) -> None:
+        for one in _Silence.waiting:
+            one._spoken = True
         usual, self._usual = self._usual, ""
         said = usual() if callable(usual) else usual
         self._print(f"{self._what}, {said}" if said else self._what)

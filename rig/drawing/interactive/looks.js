@@ -32,7 +32,7 @@ function readInk() {
 const minus = (text) => text.replace("-", "\u2212");
 const plain = (value, digits = 6) => {
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-4 || size >= 1e7)) return minus(value.toExponential(digits - 2));
+  if (size !== 0 && (size < 1e-4 || size >= 1e7)) return minus(value.toExponential(digits - 2).replace(/\.?0+e/, "e"));
   return minus(String(Number(value.toPrecision(digits))));
 };
 
@@ -42,6 +42,9 @@ function tickTexts(values) {
   const longer = steps.some((step) => Math.abs(step - Number(step.toFixed(digits))) > 1e-3 * step) ? 1 : 0;
   return values.map((value) => (value == null ? "" : minus(value.toFixed(digits + longer))));
 }
+
+/** Text of a tick of a logarithmic axis; none at an end that is no round number. */
+const roundText = (value) => (value == null || Math.abs(Number(value.toPrecision(2)) / value - 1) > 1e-9 ? "" : plain(value));
 
 /** Width of an axis beside the panel, for the longest of its numbers. */
 const widthOf = (_, texts) => Math.max(40, 14 + 7.2 * Math.max(0, ...(texts ?? []).map((text) => text.length)));

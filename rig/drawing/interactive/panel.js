@@ -51,7 +51,7 @@ class Panel {
       grid: { stroke: () => ink.line, width: 1 },
       ticks: { stroke: () => ink.line, width: 1, size: 4 },
       border: { show: true, stroke: () => ink.muted, width: 1 },
-      values: (_, values) => (about.log ? values.map((value) => (value == null ? "" : plain(value))) : tickTexts(values)),
+      values: (_, values) => (about.log ? values.map(roundText) : tickTexts(values)),
       ...(ticks && {
         splits: (made) => within([made.scales[more.scale].min, made.scales[more.scale].max], ticks.at),
         values: (_, values) => (ticks.texts ? values.map((value) => ticks.texts[ticks.at.indexOf(value)] ?? "") : tickTexts(values)),
