@@ -106,7 +106,7 @@ def _coherence(bench: Bench, responses: Responses) -> list[Finding]:
         if channel.role == "monitor" and not channel.loopback:
             continue
         verdict = graded(float(value), (GOOD_COHERENCE, 1.0), (MIN_COHERENCE, 1.0))
-        text = {"ok": "", "warn": "much noise beside the excitation: a loose cable, or a level too low"}.get(
+        text = {"ok": "", "warn": "much noise in addition to the excitation: a loose cable, or a level too low"}.get(
             verdict, "does not follow the excitation: sensor, cable or supply is dead"
         )
         out.append(Finding("life", channel.name, verdict, float(value), "coherence", f"from {GOOD_COHERENCE:g}", text))

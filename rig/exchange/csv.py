@@ -110,7 +110,7 @@ def table_of_ours(path: Path) -> StoredObject | None:
                 block = block[:, ::2] + 1j * block[:, 1::2]
             arrays[name] = np.moveaxis(block.reshape(len(rows), *trailing), 0, axis)
         if column != rows.shape[1]:
-            raise ValueError(f"{rows.shape[1]} columns, the comment tells of {column}")
+            raise ValueError(f"{rows.shape[1]} columns, the comment names {column}")
         arrays |= {name: _loose(stored) for name, stored in others["arrays"].items()}
         return StoredObject(first.removeprefix(_KIND).strip(), arrays, others["attributes"])
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, csv.Error) as error:

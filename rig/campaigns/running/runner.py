@@ -159,7 +159,7 @@ def _with_earlier_facts(recording: Recording, bench: Bench, options: RunOptions)
             fault = error.errors()[0]
             key = ".".join(str(part) for part in ("rehearsal", *fault["loc"]))
             raise RecordingError(
-                f"{recording.path.name}: {key} of its last part: {fault['msg']}; name the rehearsal anew"
+                f"{recording.path.name}: {key} of its last part: {fault['msg']}; give the rehearsal again"
             ) from None
     if options.check is None and memory_of(bench).check is None:
         options = replace(options, check=_checked(about))

@@ -36,7 +36,7 @@ BESIDE_THE_LEVEL = {
     EndReason.SAMPLES_LOST: ("wire or computer were too slow, not the level", "see `rig doctor --daq BENCH`"),
     EndReason.PLANT_CONTRADICTED: (
         "amplifier or a sensor of force or drive has another gain or polarity than when [plant] was measured",
-        "look at the amplifier's gain and at both sensors, then `rig check`; after a change of the rig, `rig tune` anew",
+        "look at the amplifier's gain and at both sensors, then `rig check`; after a change of the rig, run `rig tune` again",
     ),
     EndReason.EMERGENCY_STOP: ("somebody pressed the stop, or its cable is broken", "ask who, and release it"),
     EndReason.SENSOR_STUCK: (
@@ -99,7 +99,7 @@ def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before
     if isinstance(plan, LockedPlan) and not (before.locked or before.points):
         return Advice(
             f"no lock was ever gained in this run: {POLARITY_HINT}",
-            "look at the polarity of force and drive (`rig check` tells it) and at controller.frequency_window_hz",
+            "look at the polarity of force and drive (`rig check` shows it) and at controller.frequency_window_hz",
         )
     if trip.reason in LIMITS or trip.reason is EndReason.SENSOR_OVERLOAD:
         return _on_a_limit(trip, bench, plan, at, before)
@@ -121,7 +121,7 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
     what = "the level" if at is None else f"the level {at.text}"
     if margin is None:
         polarity = ", or polarity or sensitivity of a sensor is wrong" if before.first else ""
-        then = "; `rig check` tells polarity and sensitivity" if before.first else ""
+        then = "; `rig check` shows polarity and sensitivity" if before.first else ""
         return Advice(f"{what} is too high{polarity}", f"{lowered}, or {raised}{then}")
     share, level, key = margin
     had = f"the point before, {level:.4g} {unit}, had reached {100.0 * share:.2g} % of {key} on channel {name}"

@@ -122,7 +122,7 @@ def _held(
     held = _course(bench, plan, rows, transient) / target.level
     least, most = int(np.argmin(held)), int(np.argmax(held))
     share = float(np.mean((rows["flags"] & SATURATED) != 0))
-    warnings = [f"the output stood at its limit in {100.0 * share:.2g} % of the sweep"] if share else []
+    warnings = [f"the output was at its limit in {100.0 * share:.2g} % of the sweep"] if share else []
     for name, place in (("fell to", least), ("rose to", most)):
         if abs(held[place] - 1.0) > NOT_HELD:
             where = f"{100.0 * held[place]:.1f} % of its level at {transient.frequency_hz[place]:.3f} Hz"

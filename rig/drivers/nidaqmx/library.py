@@ -33,7 +33,7 @@ _CHANNEL = "there is no such channel: see driver.options.output and inputs, and 
 _SETTING = (
     "the channel has no such setting: see driver.options.coupling, terminal and excitation_ma, and the data sheet"
 )
-_EXPIRED = "the device's watchdog has expired and set the output to 0 V, for this computer was not heard of in time"
+_EXPIRED = "the device's watchdog has expired and set the output to 0 V, because this computer did not answer in time"
 _WAITED = "the device did not answer in time: see driver.options.timeout_s"
 
 ERRORS: dict[type[DaqError], dict[str, tuple[int, ...]]] = {

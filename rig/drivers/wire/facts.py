@@ -111,7 +111,7 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
     scales = np.array([*facts.v_per_count, *facts.range_v, facts.output_v_per_count, facts.output_range_v])
     if not (np.isfinite(scales).all() and (scales > 0.0).all() and facts.largest_block >= 1):
         raise DaqProtocol(
-            f"{dialogue.link.name}: the device tells ranges, steps or blocks that are not positive numbers"
+            f"{dialogue.link.name}: the device reports ranges, steps or blocks that are not positive numbers"
         )
     return facts
 

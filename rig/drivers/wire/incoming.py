@@ -22,7 +22,10 @@ from rig.wire.messages import (
 
 OLD_BLOCKS_IN_A_ROW = 3  # consecutive old blocks after which the device must have started to count anew
 UNARMED_BEATS = 2  # the first may have been sent before the device was armed
-UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}
+UNARMED = {
+    int(DeviceState.IDLE): "was stopped by another program",
+    int(DeviceState.RUNNING): "was disarmed by another program",
+}
 REMEMBERED = 4  # blocks that were given up (one of them that comes after all is late, not repeated), and readbacks
 MOST_LOOKED_AT = 64  # messages that are looked through for a block that another has overtaken
 
@@ -172,7 +175,7 @@ class Incoming:
         self._last_old = first
         if self._old_in_a_row >= OLD_BLOCKS_IN_A_ROW:
             raise DaqReset(
-                f"{self._link.name}: the device counts its samples anew, from {first}: it was started by another"
+                f"{self._link.name}: the device has restarted its sample count, from {first}: it was started by another program"
             )
         return False
 

@@ -111,7 +111,7 @@ def _listed(found: Sequence[FileContents]) -> Iterator[str]:
 
 def _sampling(proposal: Proposal) -> Iterator[str]:
     if proposal.rate_hz is None:
-        yield "# The file tells no sample rate. Fill it in:"
+        yield "# The file has no sample rate. Fill it in:"
         yield "#sample_rate_hz ="
     elif proposal.time is not None:
         unit = _one_line(proposal.time.unit) or "s"
@@ -119,7 +119,7 @@ def _sampling(proposal: Proposal) -> Iterator[str]:
     elif proposal.rate_from:
         yield f"sample_rate_hz = {proposal.rate_hz!r}    # by {_one_line(proposal.rate_from)} in the file"
     else:
-        yield f"#sample_rate_hz = {proposal.rate_hz!r}    # the file tells it itself"
+        yield f"#sample_rate_hz = {proposal.rate_hz!r}    # the file states it"
     yield "#new_rate_hz =                   # lower sample rate, to which the data is filtered and decimated"
 
 
