@@ -64,7 +64,9 @@ def objects_in(file: "h5py.File") -> "Iterator[h5py.Group | h5py.Dataset]":
         for name in group:
             where = f"{path}/{name}"
             if group.id.links.get_info(name.encode("utf-8", "surrogateescape")).type != h5py.h5l.TYPE_HARD:
-                raise RecordingError(f"{where} is a link to elsewhere; a file of its own is wanted, without soft links")
+                raise RecordingError(
+                    f"{where} is a link to elsewhere; a file of its own is expected, without soft links"
+                )
             item = group[name]
             address = h5py.h5o.get_info(item.id).addr
             if address in seen:

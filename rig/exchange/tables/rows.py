@@ -97,7 +97,7 @@ class Columns:
         if value is not None:
             return value
         if not cell.strip():
-            raise RowFailed(line, column, "is empty; a number is wanted in every row")
+            raise RowFailed(line, column, "is empty; a number is expected in every row")
         hint = '; write decimals with a point, or give `csv = { decimal = "," }`' if "," in cell else ""
         raise RowFailed(line, column, f"'{cell.strip()[:60]}' is not a number{hint}")
 

@@ -169,7 +169,7 @@ def _check_starts(records: Mapping[str, Sequence[_Signal]]) -> None:
             if abs(shift) * one.rate_hz > _SAME_START + _ROUNDED * abs(one.start_s) * one.rate_hz:
                 raise ImportFailed(
                     f"{one.function.where}: {name} begins at {one.start_s:g} s, {other.function.where} at {other.start_s:g} s; "
-                    "wanted is the same time between them in each record"
+                    "expected the same time between them in each record"
                 )
 
 

@@ -97,7 +97,7 @@ class FileUnits:
             if denominator is None or denominator.si != source:
                 raise ImportFailed(
                     f"{function.where}: the ordinate is labelled {function.ordinate.unit}, its denominator {label}; "
-                    "wanted is the same, or no label of the denominator"
+                    "expected the same, or no label of the denominator"
                 )
         if self._assumed == "si":
             return _by_code(function.ordinate) or output, source, 1.0
