@@ -9,18 +9,35 @@ from tests.sharing import made_once, shared_folder
 
 
 def run_shared(words: list[str]) -> Ended:
-    """Run a command in the present folder; what ``rig run PLAN -o FILE`` makes of a plan on a shipped bench is made once."""
+    """Run a command in the present folder, once for all pages where words and files tell all that it does.
+
+    These are ``rig run PLAN -o FILE`` on a shipped bench, and ``rig identify`` of recordings and models.
+    """
+    told = _told_by(words)
+    if told is None or Path(words[-1]).exists():
+        return run_command(*words)
+    name = hashlib.sha256("\n".join([*words, *told]).encode()).hexdigest()[:24]
+    try:
+        folder = made_once(shared_folder() / "commands" / name, lambda folder: _run(words, folder))
+    except _FailedError as failed:
+        return failed.ended
+    shutil.copy(folder / words[-1], words[-1])
+    return Ended(0, *((folder / stream).read_text(encoding="utf-8") for stream in ("out", "err")))
+
+
+def _told_by(words: list[str]) -> list[str] | None:
+    """What the files of a command hold; None where it may depend on more than its words and these."""
     match words:
-        case ["run", plan, "-o", output] if (text := _plan_alone(plan)) is not None and not Path(output).exists():
-            name = hashlib.sha256("\n".join([plan, output, text]).encode()).hexdigest()[:24]
-            try:
-                folder = made_once(shared_folder() / "commands" / name, lambda folder: _run(words, folder))
-            except _FailedError as failed:
-                return failed.ended
-            shutil.copy(folder / output, output)
-            return Ended(0, *((folder / stream).read_text(encoding="utf-8") for stream in ("out", "err")))
+        case ["run", plan, "-o", _]:
+            text = _plan_alone(plan)
+            return None if text is None else [text]
+        case ["identify", *options, "-o", _] if not any(":" in one or one.endswith(".py") for one in options):
+            files = [Path(one) for one in options if one.endswith(".h5")]
+            if not all(one.is_file() for one in files):
+                return None  # whatever is said of it
+            return [hashlib.sha256(one.read_bytes()).hexdigest() for one in files]
         case _:
-            return run_command(*words)
+            return None
 
 
 def _plan_alone(plan: str) -> str | None:
