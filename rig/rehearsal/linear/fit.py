@@ -4,17 +4,19 @@ Every parameter has a prior, wide for what nobody knows; it bounds the direction
 stiffnesses and all else that is positive are fitted and drawn by their logarithms.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy
 
 from rig.errors import ConfigurationError
-from rig.rehearsal.linear.model import Prior, Responses
+from rig.rehearsal.linear.model import LinearRig, Prior, Responses
 from rig.rehearsal.linear.parameters import ParameterTable, parameters_of, start_values
 from rig.rehearsal.linear.posterior import Linearisation, Posterior
+from rig.rehearsal.linear.slopes import weighted_slopes
 from vibrolock.arrays import Complex, Float
+from vibrolock.one_thread import one_thread
 
 _MIN_UNEXPLAINED = 4.0  # misfit over its expectation above which a further mode is sought; chosen
 _MAX_LEFT = 0.5  # largest part of that misfit that may be left for the further mode to be kept; chosen
@@ -81,26 +83,23 @@ def _fit(
         error = (misses(x) / sigma).ravel()
         return np.concatenate([error.real, error.imag, (x - centre) / std])
 
+    def derivatives(x: Float) -> Float:
+        return np.concatenate([weighted_slopes(_rig(table, x), table.names, responses, sigma), np.diag(1.0 / std)])
+
     bounds = table.bounds
-    fits = []
     with np.errstate(over="ignore", invalid="ignore"):
-        for start in starts:
-            x = np.clip(_with_measured_force(table, table.vector(start), responses), *bounds)
-            fit = scipy.optimize.least_squares(
-                residuals, x, bounds=bounds, x_scale=std, max_nfev=_MAX_EVALUATIONS, ftol=_TOLERANCE, xtol=_TOLERANCE
-            )
-            fits.append(fit)
-    found = min(fits, key=lambda fit: float(fit.cost))
-    if not np.all(np.isfinite(found.fun)):
+        vectors = [np.clip(_with_measured_force(table, table.vector(start), responses), *bounds) for start in starts]
+    found, remaining, slope = _best_fit(residuals, derivatives, vectors, bounds, std)
+    if not np.all(np.isfinite(remaining)):
         raise ConfigurationError("the responses are not those of a shaker, a stinger and a structure near one mode")
-    error = misses(found.x)
+    error = misses(found)
     expected = max(2 * error.size - centre.size, 1)
     inflation = float(np.sum(np.abs(error / sigma) ** 2)) / expected
-    jacobian = np.asarray(found.jac)[: 2 * error.size] / np.sqrt(max(1.0, inflation))
+    jacobian = slope[: 2 * error.size] / np.sqrt(max(1.0, inflation))
     covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(std**-2.0))
     relative = np.abs(error) / scale
     best = replace(
-        _posterior(table, found.x, covariance),
+        _posterior(table, found, covariance),
         misfit=float(np.sqrt(np.mean(relative**2))),
         inflation=inflation,
         determined=float(np.mean(np.linalg.eigvalsh(covariance / np.outer(std, std)) < _HALVED)),
@@ -109,9 +108,39 @@ def _fit(
     return best, float(responses.frequency_hz[int(np.argmax(relative[:, 1]))])
 
 
+def _best_fit(
+    residuals: Callable[[Float], Float],
+    derivatives: Callable[[Float], Float],
+    starts: Sequence[Float],
+    bounds: tuple[Float, Float],
+    scale: Float,
+) -> tuple[Float, Float, Float]:
+    """Return the fit with the smallest sum of squares of those from several starts: parameters, residuals, Jacobian."""
+    least_squares = scipy.optimize.least_squares  # loads the libraries whose threads are limited
+    with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+        fits = [
+            least_squares(
+                residuals,
+                start,
+                derivatives,
+                bounds=bounds,
+                x_scale=scale,
+                max_nfev=_MAX_EVALUATIONS,
+                ftol=_TOLERANCE,
+                xtol=_TOLERANCE,
+            )
+            for start in starts
+        ]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return np.asarray(best.x), np.asarray(best.fun), np.asarray(best.jac)
+
+
 def _model(table: ParameterTable, x: Float, responses: Responses) -> Complex:
-    rig = _posterior(table, x, np.empty(0)).rig()
-    return rig.responses(responses.frequency_hz, responses.sample_rate_hz)
+    return _rig(table, x).responses(responses.frequency_hz, responses.sample_rate_hz)
+
+
+def _rig(table: ParameterTable, x: Float) -> LinearRig:
+    return _posterior(table, x, np.empty(0)).rig()
 
 
 def _posterior(table: ParameterTable, x: Float, covariance: Float) -> Posterior:

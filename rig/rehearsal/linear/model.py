@@ -75,9 +75,14 @@ class LinearRig:
         """Force per volt at the amplifier, N/V, where the drive point has this receptance (m/N)."""
         v = self.values
         lag = 1.0 + s * v["coil_time_constant_s"]
-        half = 0.5 * v["exciter_damping_n_s_m"]
-        stiffness = s**2 * v["moving_mass_kg"] + s * half * (1.0 + 1.0 / lag) + v["suspension_stiffness_n_m"]
-        return v["force_per_volt_n_v"] / lag / (1.0 + stiffness * (receptance + 1.0 / v["stinger_stiffness_n_m"]))
+        compliance = receptance + 1.0 / v["stinger_stiffness_n_m"]
+        return v["force_per_volt_n_v"] / lag / (1.0 + self.dynamic_stiffness(s) * compliance)
+
+    def dynamic_stiffness(self, s: Complex) -> Complex:
+        """Z of the shaker with its coil, N/m."""
+        v = self.values
+        half, lag = 0.5 * v["exciter_damping_n_s_m"], 1.0 + s * v["coil_time_constant_s"]
+        return s**2 * v["moving_mass_kg"] + s * half * (1.0 + 1.0 / lag) + v["suspension_stiffness_n_m"]
 
     def responses(self, frequency_hz: Float, sample_rate_hz: float) -> Complex:
         """Responses as `Responses.value` has them."""

@@ -11,7 +11,9 @@ import scipy
 
 from rig.errors import ConfigurationError
 from rig.rehearsal.linear.model import LinearRig, Responses
+from rig.rehearsal.linear.slopes import weighted_slopes
 from vibrolock.arrays import Bool, Float
+from vibrolock.one_thread import one_thread
 
 _MAX_CORRECTIONS = 20
 """Evaluations in which a sample must reach its responses; chosen: more are needed only by samples that belong to no rig."""
@@ -91,13 +93,18 @@ class Posterior:
         def misses(x: Float) -> Float:
             return np.concatenate([near.weighted(self.rig(x)) - wanted, (x - drawn) / near.prior_std])
 
+        def derivatives(x: Float) -> Float:
+            of_responses = weighted_slopes(self.rig(x), self.names, near.responses, near.weight)
+            return np.concatenate([of_responses, np.diag(1.0 / near.prior_std)])
+
         noise = float(self.mean.size)  # expected sum of squares by noise alone
         drawn = np.clip(drawn, *near.bounds)
         if float(np.sum(misses(drawn) ** 2)) < noise:
             return drawn
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = scipy.optimize.least_squares(
-                misses, drawn, bounds=near.bounds, x_scale=near.prior_std, max_nfev=_MAX_CORRECTIONS
+        least_squares = scipy.optimize.least_squares  # loads the libraries whose threads are limited
+        with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+            found = least_squares(
+                misses, drawn, derivatives, bounds=near.bounds, x_scale=near.prior_std, max_nfev=_MAX_CORRECTIONS
             )
         if not 2.0 * float(found.cost) < noise:
             raise ConfigurationError("no rig has the responses that were drawn")

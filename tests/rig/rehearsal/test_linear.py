@@ -6,6 +6,7 @@ import pytest
 from rig.rehearsal.linear.fit import posterior
 from rig.rehearsal.linear.model import LinearRig, Prior, Responses
 from rig.rehearsal.linear.parameters import POSSIBLE
+from rig.rehearsal.linear.slopes import slopes
 from simulators import VirtualRig
 from simulators.analysis import frequency_response
 from tests.rig.rehearsal.known import EXCITER, MODE, RATIOS
@@ -160,3 +161,16 @@ def test_a_fit_never_leaves_what_a_rig_can_be(monkeypatch):
         values = [one[name] for one in seen]
         assert min(values) > 0.0, name
         assert max(values) < np.exp(2.0 * POSSIBLE) * (1.0 + 1e-9) * min(values), name
+
+
+def test_slopes_are_those_of_central_differences():
+    found = posterior(("tip",), START, {}, None)
+    at = found.mean + 0.1 * np.random.default_rng(1).standard_normal(found.mean.size)
+    exact = slopes(found.rig(at), LINES[::20], RATE_HZ)
+    assert set(exact) == set(found.names)
+    for k, name in enumerate(found.names):
+        step = (1e-5 if found.positive[k] else 1e-7) * np.eye(at.size)[k]
+        ends = [found.rig(at + sign * step).responses(LINES[::20], RATE_HZ) for sign in (1.0, -1.0)]
+        difference = (ends[0] - ends[1]) / (2.0 * step[k])
+        allowed = 1e-6 * np.max(np.abs(difference)) + 1e-10 * np.max(np.abs(ends))  # truncation and rounding
+        np.testing.assert_allclose(exact[name], difference, rtol=0.0, atol=allowed, err_msg=name)
