@@ -8,6 +8,7 @@ import numpy as np
 from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
 from identification.common import LevelFit
 from rig.drawing.axes import ticks_at_1_2_5
+from rig.drawing.interactive.shapes import note_points
 from rig.drawing.page import grid
 from rig.drawing.steady_curve import UNSTABLE, draw_stability
 from rig.drawing.style import COLOURS, REJECTED, Axes, Figure, legend_above, length_factor, plain_log, shade, title
@@ -30,23 +31,30 @@ class MeasuredSurface(Protocol):
 
 
 def draw_force_surface(
-    page: Figure, responses: Sequence[FrequencyResponse], surface: ForceSurface | None, *, text: str = ""
+    page: Figure,
+    responses: Sequence[FrequencyResponse],
+    surface: ForceSurface | None,
+    *,
+    text: str = "",
+    notes: Sequence[tuple[str, ...]] = (),
 ) -> None:
     """Draw receptance and lag of every level on the left; constant-force curves and the force over displacement on the right.
 
-    ``page`` is an empty figure, about 11 by 7 inches. Without a ``surface`` the right half is left out.
+    ``page`` is an empty figure, about 11 by 7 inches. Without a ``surface`` the right half is left out. ``notes`` are told of
+    the points of each response to who points at them.
     """
     columns = 1 if surface is None else 2
     axes = grid(page, 2, columns)
     scale, unit = length_factor(np.concatenate([response.amplitude_m for response in responses]))
     levels = sorted({response.level for response in responses})
-    for response in responses:
+    for number, response in enumerate(responses):
         colour = shade(levels.index(response.level), len(levels))
         named = len(levels) <= _MOST_NAMED or response.level in (levels[0], levels[-1])
         name = f"{scale * response.level:.4g} {unit}" if named else None
         receptance = scale * response.amplitude_m / response.force_n
-        axes[0, 0].plot(response.frequency_hz, receptance, ".", color=colour, label=name)
-        axes[1, 0].plot(response.frequency_hz, response.phase_lag_deg, ".", color=colour)
+        for axis, values, label in ((axes[0, 0], receptance, name), (axes[1, 0], response.phase_lag_deg, None)):
+            (drawn,) = axis.plot(response.frequency_hz, values, ".", color=colour, label=label)
+            note_points(drawn, notes[number] if notes else ())
     fits = () if surface is None else surface.levels
     for index, fit in enumerate(fits):
         frequency_hz, stiffness = fitted_stiffness(fit)
