@@ -53,7 +53,7 @@ class IdentifyGroup(KindGroup):
         with escalating() as signals:
             lines = FitLines(signals.check)
             try:
-                with Waiting(f"identifying a {kind} model from {', '.join(map(str, files))}"):
+                with Waiting(f"identifying the {kind} model from {', '.join(map(str, files))}"):
                     found = identify_model(files, options, progress=lines)
             finally:
                 lines.close()

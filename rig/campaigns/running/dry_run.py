@@ -20,6 +20,8 @@ from rig.tick.sequencer.layout import EVALUATED, SegmentKind
 MOST_LEVELS = 20  # levels that are listed; chosen: two lines
 SLOW, FAST = 25.0, 70.0
 """Times real time of one process with the evaluation of its points: of the magnet beam's backbone on two machines."""
+START_S, SLOWEST = 2.0, 10.0
+"""Time until a virtual rig runs, and its least times real time: of a sweep of the magnet beam beside other work."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def expected_duration(plan: Plan, bench: Bench, *, by_the_clock: bool) -> str:
     least_s, most_s = found.least.duration_s, found.most.duration_s
     if by_the_clock:
         return _between(duration(least_s), duration(most_s))
-    return f"some {duration(least_s / FAST)} to {duration(least_s / SLOW)} on a virtual rig for {duration(least_s)} of test"
+    quick, slow = (duration(START_S + least_s / speed) for speed in (FAST, SLOWEST))
+    return f"some {quick} to {slow} on a virtual rig for {duration(least_s)} of test"
 
 
 def dry_run(plan: Plan, bench: Bench, output: Path) -> DryRun:
