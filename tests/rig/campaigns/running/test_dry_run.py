@@ -1,5 +1,6 @@
 """What a run would take, against runs that were carried out; and what arms a bench, without opening it."""
 
+import re
 import shutil
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 from rig.arming.bench_memory import RememberedTrip, now, remember
 from rig.bench import load_bench
 from rig.campaigns.plans import bench_of, load_plan
-from rig.campaigns.running.dry_run import dry_run
+from rig.campaigns.running.dry_run import dry_run, expected_duration
 from tests.recorded import SHORT, changed, recorded_run
 from tests.rig.rigs import bench_with
 
@@ -70,3 +71,12 @@ def test_a_dry_run_writes_nothing_and_a_run_wants_a_file(command, place, monkeyp
     status, out, err = command("run magnet-beam/backbone")
     assert (status, out) == (2, "")
     assert "--output: a file is needed, or --dry-run" in err
+
+
+def test_how_long_a_run_takes_is_that_of_its_sweep_and_faster_on_a_virtual_rig():
+    """10 to 40 Hz at 0.25 Hz/s last 120 s, beside ramps and holds of some seconds."""
+    plan, bench = load_plan("magnet-beam/sweep-1"), load_bench("magnet-beam")
+    assert re.fullmatch(r"about 2 min \d s", expected_duration(plan, bench, by_the_clock=True))
+    assert re.fullmatch(
+        r"some \d s to 1\d s .* for 2 min \d s of test", expected_duration(plan, bench, by_the_clock=False)
+    )
