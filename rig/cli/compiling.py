@@ -24,7 +24,7 @@ class _Lines:
             return
         self.due_s = time.monotonic() + EVERY_S
         so_far = f" ({self.count} functions so far)" if self.count > FEW else ""
-        say_beside(f"compiling for this computer, only this time: some fifteen seconds of one core{so_far}")
+        say_beside(f"compiling for this computer, only this time: some 15 s to a minute{so_far}")
 
 
 @contextlib.contextmanager
