@@ -57,6 +57,16 @@ def bound(kernel: Callable[P, R], *examples: P.args, **named: P.kwargs) -> Calla
     return cast("Callable[P, R]", made.compile(tuple(map(made.typeof_pyval, examples))))
 
 
+def compiled_text(kernel: Callable[..., Any]) -> tuple[str, str]:
+    """Return the LLVM text of a kernel that is compiled here or loaded, with all that it calls, and its function's name there.
+
+    Raises LookupError if it is not compiled, AttributeError if numba is told not to compile.
+    """
+    made: Any = cast("_Kernel", kernel).overloads
+    result = made[next(iter(made), None)]
+    return str(result.library._get_module_for_linking()), str(result.fndesc.llvm_func_name)
+
+
 def _compiled(function: Callable[P, R], options: dict[str, Any]) -> Callable[P, R]:
     return cast("Callable[P, R]", _Kernel(function, options))
 

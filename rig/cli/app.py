@@ -17,6 +17,7 @@ from rig.cli.docs import docs
 from rig.cli.doctor import doctor
 from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
+from rig.cli.firmware import app as firmware_app
 from rig.cli.flags import with_flags
 from rig.cli.group import Group
 from rig.cli.identify import app as identify_app
@@ -59,6 +60,7 @@ def _common(
 
 app.add_typer(identify_app, name="identify")
 app.add_typer(predict_app, name="predict")
+app.add_typer(firmware_app, name="firmware")
 for _command in (list_, new, schema, import_, export_, tune_, emulate, conformance, check_, calibrate_, rehearse_):
     app.command(_command.__name__.rstrip("_"))(_command)
 app.command("reproduce", cls=StudyCommand, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})(
