@@ -43,7 +43,8 @@ class Target:
                 value=self.name,
                 hint="the wheels of PyPI have it",
             ) from None
-        return found.create_target_machine(cpu=self.cpu, features=self.features, opt=2, reloc="static")
+        reloc = "pic" if self.name == HOST else "static"
+        return found.create_target_machine(cpu=self.cpu, features=self.features, opt=2, reloc=reloc, codemodel="small")
 
 
 TARGETS = {
@@ -51,7 +52,7 @@ TARGETS = {
     for target in (
         Target(
             "cortex-m7",
-            "thumbv7em-none-eabihf",
+            "thumbv7em-unknown-none-eabihf",
             "cortex-m7",
             "+fp-armv8d16,+fp64",
             ARM_LAYOUT,
@@ -59,7 +60,7 @@ TARGETS = {
         ),
         Target(
             "cortex-m33",
-            "thumbv8m.main-none-eabihf",
+            "thumbv8m.main-unknown-none-eabihf",
             "cortex-m33",
             "",
             ARM_LAYOUT,
