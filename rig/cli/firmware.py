@@ -21,7 +21,7 @@ def tick_(
     target: Annotated[str, typer.Option(help="cortex-m7, cortex-m33 or host.")] = "cortex-m7",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files of another content there.")] = False,
 ) -> None:
-    """Compile the tick, from measurement to output, as an object file with a C header, a text of sizes and the kernels' digest."""
+    """Compile the tick, from measurement to output: an object file, its C header, and a text of sizes and digest."""
     from rig.firmware.build import build_tick
 
     built = build_tick(target, output, overwrite=overwrite)

@@ -29,9 +29,9 @@ class Built(NamedTuple):
 def build_tick(target: str, folder: Path, *, overwrite: bool = False) -> Built:
     """Compile the tick for a target and write ``tick-TARGET.o``, its header and ``tick-TARGET.txt`` into a folder.
 
-    The folder is made if it is not there. All files are written, or none. Raises `ConfigurationError` for a target that there is
-    not or that llvmlite cannot compile for, `RecordingError` if a file cannot be written or has another content already
-    and ``overwrite`` is false.
+    The folder is made if it is not there. All files are written, or none. Raises `ConfigurationError` for a target that there
+    is not or that llvmlite cannot compile for, `RecordingError` if a file cannot be written, or has another content
+    already and ``overwrite`` is false.
     """
     chosen = target_named(target)
     paths = [folder / f"tick-{target}.o", folder / HEADER, folder / f"tick-{target}.txt"]

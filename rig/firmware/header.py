@@ -132,7 +132,8 @@ int32_t {symbol}(
     {parameters});
 
 /* Process n samples of n_channels. Returns 0; anything else is a fault of the compiled code. */
-static inline int32_t vibrolock_tick(const struct tick_arrays *t, const struct tick_samples *s, int64_t n, int64_t n_channels) {{
+static inline int32_t vibrolock_tick(const struct tick_arrays *t, const struct tick_samples *s, int64_t n,
+                                     int64_t n_channels) {{
     void *result = 0, *fault = 0;
     return {symbol}(&result, &fault,
         {given});

@@ -61,7 +61,8 @@ def _compile() -> None:
         compiled_text(tick_block)
     except (AttributeError, LookupError) as error:
         raise ConfigurationError(
-            f"there is no LLVM text of the kernels ({error})", hint="numba may be told not to compile, NUMBA_DISABLE_JIT"
+            f"there is no LLVM text of the kernels ({error})",
+            hint="numba may be told not to compile, NUMBA_DISABLE_JIT",
         ) from None
 
 

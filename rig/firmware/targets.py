@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from llvmlite.binding import TargetMachine
 
 ARM_LAYOUT = "e-m:e-p:32:32-Fi8-i64:64-v128:64:128-a:0:32-n32-S64"
-"""Of the 32-bit ABI of ARM (AAPCS), in LLVM's words: little end first, pointers of 32 bits, 64-bit numbers aligned to 8 bytes."""
+"""Of the ABI of 32-bit ARM (AAPCS), in LLVM's words: little end first, pointers of 32 bits, numbers of 64 bits at 8 bytes."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
-"""The compiled tick: its header against numpy, its arithmetic on a Cortex-M7 in QEMU and on this computer against the loop's own."""
+"""The compiled tick: its header against numpy, its arithmetic, in QEMU and on this computer, against the loop's own."""
 
 import importlib
-import os
 import pickle
 import re
 import subprocess
@@ -114,7 +113,8 @@ def test_numbers_below_the_normal_ones_and_those_that_are_none_come_through_as_o
 def test_a_sample_takes_some_thousand_instructions_and_four_kilobytes_of_stack(on_m7):
     with_harmonics = np.concatenate([one.instructions for one in on_m7[3:6]])
     assert 2000 < with_harmonics.mean() < 6000
-    assert with_harmonics.max() < 0.25 * 480e6 / 10e3  # at two cycles an instruction, half of a sample at 10 kHz and 480 MHz
+    cycles = 2 * with_harmonics.max()
+    assert cycles < 0.5 * 480e6 / 10e3  # half of a sample at 10 kHz and 480 MHz
     assert 2000 < on_m7[0].stack < 6000
 
 
@@ -218,11 +218,15 @@ def test_files_of_another_content_stay_and_nothing_is_written_beside_them(tmp_pa
     (tmp_path / "build" / HEADER).write_text("mine")
     with refused(RecordingError):
         build_tick("cortex-m7", tmp_path / "build")
-    assert os.listdir(tmp_path / "build") == [HEADER]
+    assert _names(tmp_path / "build") == [HEADER]
     built = build_tick("cortex-m7", tmp_path / "build", overwrite=True)
-    assert sorted(os.listdir(tmp_path / "build")) == ["tick-cortex-m7.o", "tick-cortex-m7.txt", HEADER]
+    assert _names(tmp_path / "build") == ["tick-cortex-m7.o", "tick-cortex-m7.txt", HEADER]
     assert built.facts.undefined == ("asked",)
     assert build_tick("cortex-m7", tmp_path / "build") == built
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
 
 
 def _object_of_something(folder: Path) -> bytes:

@@ -47,8 +47,8 @@ def tick_of(law_name: str) -> Tick:
             Segment(SegmentKind.RECORD, point, level * (0.2 if by_force else 1.0), 6.0),
         ]
     amplitude = AmplitudeLaw.FORCE if by_force else AmplitudeLaw.VOLTAGE
-    settings = TickSettings(load_bench(BENCH), law, amplitude, SettleRule(average_periods=3, settled_periods=3, longest_periods=12), segments)
-    return settings.build(0.5)
+    rule = SettleRule(average_periods=3, settled_periods=3, longest_periods=12)
+    return TickSettings(load_bench(BENCH), law, amplitude, rule, segments).build(0.5)
 
 
 def copy_of(arrays: TickArrays) -> TickArrays:

@@ -1,4 +1,4 @@
-"""The compiled tick as a program: of this computer, or as an image for a Cortex-M in QEMU. It runs samples that were captured."""
+"""The compiled tick as a program: of this computer, or as an image for a Cortex-M in QEMU. It runs captured samples."""
 
 import subprocess
 from collections.abc import Sequence
@@ -33,8 +33,10 @@ class Samples(NamedTuple):
 
 
 class Ticked(NamedTuple):
-    """What a tick came to: its arrays after, readings, rows and outputs; instructions a block, at the block's first sample;
-    bytes of stack; and the digest that the object tells."""
+    """What a tick came to: arrays after, readings, rows and outputs.
+
+    Instructions a block stand at the block's first sample; the stack is in bytes; the digest is the one that the object tells.
+    """
 
     after: TickArrays
     readings: np.ndarray
@@ -55,7 +57,15 @@ def program(target: str, folder: Path) -> Path:
     else:
         processor = [f"-mcpu={target}", "-mthumb", f"-mfpu={FLOATS[target]}", "-mfloat-abi=hard"]
         board = ["-nostartfiles", "--specs=rdimon.specs", f"-L{HERE}", f"-T{HERE}/{BOARDS[target]}.ld"]
-        command = ["arm-none-eabi-gcc", *FLAGS, *processor, HERE / "start.c", *sources, *board, "-Wl,--no-warn-execstack"]
+        command = [
+            "arm-none-eabi-gcc",
+            *FLAGS,
+            *processor,
+            HERE / "start.c",
+            *sources,
+            *board,
+            "-Wl,--no-warn-execstack",
+        ]
     subprocess.run(command, check=True, capture_output=True, text=True)
     return out
 
@@ -119,4 +129,5 @@ def _answered(samples: Samples, raw: bytes) -> tuple[Ticked, bytes]:
     rest = [take(types["readings"], n, channels), take(types["rows"], n), take(types["outputs"], n)]
     counts = take(np.dtype(np.uint32), n) & 0xFFFFFF
     whole = TickArrays(**after, waveforms=samples.before.waveforms)
-    return Ticked(whole, *rest, counts * INSTRUCTIONS, int.from_bytes(raw[64:72], "little"), raw[:64].decode()), raw[at:]
+    digest, stack = raw[:64].decode(), int.from_bytes(raw[64:72], "little")
+    return Ticked(whole, *rest, counts * INSTRUCTIONS, stack, digest), raw[at:]
