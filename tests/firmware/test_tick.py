@@ -56,16 +56,23 @@ def captured(checks: SimpleNamespace) -> list:
     return [checks.captures.Captured(*one) for one in pickle.loads((folder / "windows").read_bytes())]
 
 
-def _ran(checks: SimpleNamespace, captured: list, target: str) -> list:
-    """What a target's program made of the windows; skips or fails as `need` does."""
+def _built(target: str) -> Path:
+    """The folder with a target's object; skips or fails as `need` does where its program could not be linked and run."""
     need(*(("cc",) if target == "host" else ("arm-none-eabi-gcc", "newlib", "qemu-system-arm")))
+    return made_once(shared_folder() / f"tick-{target}", lambda folder: build_tick(target, folder) and None)
+
+
+def _ran(checks: SimpleNamespace, captured: list, *targets: str, one_libm: bool = False) -> list:
+    """What the program of the last of these targets, run one after the other in one folder, made of the windows."""
+    built = [_built(target) for target in targets]
 
     def make(folder: Path) -> None:
-        program = checks.images.program(target, folder)
-        done = checks.images.ticked(program, folder, [one.samples for one in captured])
+        for target, of in zip(targets, built, strict=True):
+            program = checks.images.program(target, of, folder, one_libm=one_libm)
+            done = checks.images.ticked(program, folder, [one.samples for one in captured])
         (folder / "ticked").write_bytes(pickle.dumps([tuple(one) for one in done]))
 
-    folder = made_once(shared_folder() / f"tick-{target}", make)
+    folder = made_once(shared_folder() / f"ticked-{'-'.join(targets)}", make)
     return [checks.images.Ticked(*one) for one in pickle.loads((folder / "ticked").read_bytes())]
 
 
@@ -74,9 +81,18 @@ def on_m7(checks: SimpleNamespace, captured: list) -> list:
     return _ran(checks, captured, "cortex-m7")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="object files of this system are no ELF files")
+ON_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="object files of this system are no ELF files")
+
+
+@ON_LINUX
 def test_the_object_for_the_host_makes_of_every_sample_what_the_loop_makes(checks, captured):
     for expected, found in zip(captured, _ran(checks, captured, "host"), strict=True):
+        assert checks.captures.differences(expected, found) == {}
+
+
+@ON_LINUX
+def test_on_a_cortex_m7_all_numbers_are_equal_to_the_bit_where_its_libm_returns_what_the_hosts_does(checks, captured):
+    for expected, found in zip(captured, _ran(checks, captured, "host", "cortex-m7", one_libm=True), strict=True):
         assert checks.captures.differences(expected, found) == {}
 
 

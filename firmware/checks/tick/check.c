@@ -7,7 +7,7 @@
 #include "instructions.h"
 #include "vibrolock_tick.h"
 
-#define POOL (3 << 20)
+#define POOL (2 << 20)
 
 static FILE *in, *out;
 static _Alignas(8) unsigned char pool[POOL];

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.firmware.build import build_tick
 from rig.firmware.signature import example
 from rig.tick.layout import TickArrays
 
@@ -47,11 +46,16 @@ class Ticked(NamedTuple):
     digest: str
 
 
-def program(target: str, folder: Path) -> Path:
-    """Build the program of a target, ``host`` or one of `BOARDS`, in a folder; return its path."""
-    made = build_tick(target, folder)
+def program(target: str, built: Path, folder: Path, *, one_libm: bool = False) -> Path:
+    """Link the program of a target, ``host`` or one of `BOARDS`, into a folder; return its path.
+
+    ``built`` is the folder that `rig firmware tick` has filled.
+
+    With ``one_libm`` the host's program notes what its libm returns, in ``libm.bin``, and an image takes its values from there.
+    """
     out = folder / f"check-{target}"
-    sources = [HERE / "check.c", made.object, f"-I{folder}", f"-I{HERE}", "-o", out, "-lm"]
+    wrapped = [HERE / "libm.c", *(f"-Wl,--wrap={name}" for name in (*FUNCTIONS, "sincos"))] if one_libm else []
+    sources = [HERE / "check.c", *wrapped, built / f"tick-{target}.o", f"-I{built}", f"-I{HERE}", "-o", out, "-lm"]
     if target not in BOARDS:
         command = ["cc", *FLAGS, *sources]
     else:
