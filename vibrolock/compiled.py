@@ -57,13 +57,17 @@ def bound(kernel: Callable[P, R], *examples: P.args, **named: P.kwargs) -> Calla
     return cast("Callable[P, R]", made.compile(tuple(map(made.typeof_pyval, examples))))
 
 
-def compiled_text(kernel: Callable[..., Any]) -> tuple[str, str]:
-    """Return the LLVM text of a kernel that is compiled here or loaded, with all that it calls, and its function's name there.
+def compiled_text(kernel: Callable[P, R], *examples: P.args, **named: P.kwargs) -> tuple[str, str]:
+    """Return the LLVM text of a kernel for arguments of the types of ``examples``, with all that it calls, and its name there.
 
-    Raises LookupError if it is not compiled, AttributeError if numba is told not to compile.
+    Raises RuntimeError if numba is told not to compile.
     """
-    made: Any = cast("_Kernel", kernel).overloads
-    result = made[next(iter(made), None)]
+    made = cast("_Kernel", kernel)._made()
+    if made is cast("_Kernel", kernel).py_func:
+        raise RuntimeError("numba is told not to compile, NUMBA_DISABLE_JIT")
+    types = tuple(map(made.typeof_pyval, examples))
+    made.compile(types)
+    result = made.overloads[types]
     return str(result.library._get_module_for_linking()), str(result.fndesc.llvm_func_name)
 
 

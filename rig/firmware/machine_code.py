@@ -12,7 +12,7 @@ from rig.firmware.header import DIGEST, SYMBOL, header
 from rig.firmware.signature import Arguments, example
 from rig.firmware.targets import Target
 from rig.tick.kernels import tick_block
-from vibrolock.compiled import bound, compiled_text
+from vibrolock.compiled import compiled_text
 from vibrolock.content_digest import content_digest
 
 _ANY_ADDRESS = re.compile(r"((?:load|store) (?:i64|double)[ ,].*?, align) 1\b")
@@ -26,7 +26,6 @@ def kernels_digest() -> str:
     A device tells the one that it was built with, a host compares it with its own. It differs between versions of Python, whose
     byte code it covers.
     """
-    _compile()
     digest = hashlib.sha256(content_digest(tick_block).encode())
     digest.update(header(example(), "").encode())
     return digest.hexdigest()
@@ -55,22 +54,13 @@ def object_file(target: Target) -> bytes:
     return bytes(machine.emit_object(module))
 
 
-def _compile() -> None:
-    try:
-        bound(tick_block, *example())
-        compiled_text(tick_block)
-    except (AttributeError, LookupError) as error:
-        raise ConfigurationError(
-            f"there is no LLVM text of the kernels ({error})",
-            hint="numba may be told not to compile, NUMBA_DISABLE_JIT",
-        ) from None
-
-
 @cache
 def _text() -> tuple[str, str]:
     """Return the LLVM text of the tick with all that it calls, and the name of its function there."""
-    _compile()
-    return compiled_text(tick_block)
+    try:
+        return compiled_text(tick_block, *example())
+    except RuntimeError as error:
+        raise ConfigurationError(f"there is no LLVM text of the kernels: {error}") from None
 
 
 def _for_target(text: str, target: Target, digest: str) -> str:
