@@ -66,6 +66,7 @@ NOT_RUN = {
     ("docs/reference/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/reference/benchmarks.md", "takes minutes"),
     ("docs/reference/race-of-methods.md", "takes an hour"),
+    ("docs/reference/compiled-tick.md", "takes minutes and needs a compiler for ARM and QEMU"),
     ("docs/reference/firmware-sizes.md", "takes minutes and needs a compiler for ARM and QEMU"),
 }
 

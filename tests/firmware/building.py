@@ -5,6 +5,7 @@ import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -52,10 +53,14 @@ def need(*programs: str) -> None:
     """
     missing = [name for name in programs if not _is_there(name)]
     if missing:
-        why = f"the firmware needs {' and '.join(missing)} to be built or run"
-        if os.environ.get("VIBROLOCK_FIRMWARE") == "required":
-            pytest.fail(why)
-        pytest.skip(why)
+        do_without(f"the firmware needs {' and '.join(missing)} to be built or run")
+
+
+def do_without(why: str) -> NoReturn:
+    """Skip the test for a reason, or fail it with ``VIBROLOCK_FIRMWARE=required``."""
+    if os.environ.get("VIBROLOCK_FIRMWARE") == "required":
+        pytest.fail(why)
+    pytest.skip(why)
 
 
 def built(target: str) -> Path:

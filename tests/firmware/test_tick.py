@@ -17,9 +17,9 @@ from rig.firmware.build import HEADER, build_tick
 from rig.firmware.header import header
 from rig.firmware.machine_code import kernels_digest
 from rig.firmware.signature import example
-from rig.firmware.targets import TARGETS
+from rig.firmware.targets import TARGETS, target_named
 from rig.tick.kernels import tick_block
-from tests.firmware.building import FOLDER, need
+from tests.firmware.building import FOLDER, do_without, need
 from tests.refused import refused
 from tests.sharing import made_once, shared_folder
 from vibrolock.compiled import compiled_text
@@ -59,6 +59,10 @@ def captured(checks: SimpleNamespace) -> list:
 def _built(target: str) -> Path:
     """The folder with a target's object; skips or fails as `need` does where its program could not be linked and run."""
     need(*(("cc",) if target == "host" else ("arm-none-eabi-gcc", "newlib", "qemu-system-arm")))
+    try:
+        target_named(target).machine()
+    except ConfigurationError as error:
+        do_without(str(error))
     return made_once(shared_folder() / f"tick-{target}", lambda folder: build_tick(target, folder) and None)
 
 

@@ -83,9 +83,14 @@ def command_for(path: Path, *options: str) -> list[str]:
     return ["qemu-system-arm", "-M", board, *quiet, "-icount", "shift=0", *options, "-kernel", str(path)]
 
 
+def write_requests(folder: Path, requests: bytes) -> None:
+    """Write what a program that runs in a folder is asked."""
+    (folder / "in.bin").write_bytes(requests + np.int64(ENDING).tobytes())
+
+
 def answer(path: Path, folder: Path, requests: bytes) -> bytes:
     """Run a program once on requests; return its answers."""
-    (folder / "in.bin").write_bytes(requests + np.int64(ENDING).tobytes())
+    write_requests(folder, requests)
     subprocess.run(command_for(path), check=True, cwd=folder, capture_output=True, timeout=600)
     return (folder / "out.bin").read_bytes()
 
@@ -98,12 +103,22 @@ def evaluated(path: Path, folder: Path, function: str, values: np.ndarray) -> np
 
 def ticked(path: Path, folder: Path, all_samples: Sequence[Samples], block: int = 1) -> list[Ticked]:
     """Run the tick of a program over captured samples, in one run of the program."""
-    raw = answer(path, folder, b"".join(_request(one, block) for one in all_samples))
+    raw = answer(path, folder, requests_for(all_samples, block))
     out = []
     for one in all_samples:
         done, raw = _answered(one, raw)
         out.append(done)
     return out
+
+
+def first(samples: Samples, n: int) -> Samples:
+    """Return the first n samples."""
+    return Samples(samples.before, samples.volts[:n], samples.flags[:n], samples.put_out[:n])
+
+
+def requests_for(all_samples: Sequence[Samples], block: int = 1) -> bytes:
+    """Return what a program is asked, to run the tick over samples in blocks."""
+    return b"".join(_request(one, block) for one in all_samples)
 
 
 def _request(samples: Samples, block: int) -> bytes:
