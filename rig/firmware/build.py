@@ -34,11 +34,11 @@ def build_tick(target: str, folder: Path, *, overwrite: bool = False) -> Built:
     already and ``overwrite`` is false.
     """
     chosen = target_named(target)
-    paths = [folder / f"tick-{target}.o", folder / HEADER, folder / f"tick-{target}.txt"]
+    paths = (folder / f"tick-{target}.o", folder / HEADER, folder / f"tick-{target}.txt")
     _prepare(folder)
     code, digest = object_file(chosen), kernels_digest()
     facts = read_object(code)
-    contents = [code, header(example(), digest).encode(), _text(chosen, facts, digest).encode()]
+    contents = (code, header(example(), digest).encode(), _text(chosen, facts, digest).encode())
     for path, content in zip(paths, contents, strict=True):
         if path.is_dir() or (path.exists() and not overwrite and path.read_bytes() != content):
             raise RecordingError(f"{path}: exists already with another content; choose another folder, or --overwrite")

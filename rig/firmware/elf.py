@@ -38,7 +38,7 @@ def read_object(content: bytes) -> ObjectFacts:
         elif kind == _SYMBOLS:
             names = content[sections[link][4] :]
             undefined |= set(_undefined(content[begin : begin + length], names, of_symbol, content[4] == 1))
-    return ObjectFacts(**sums, undefined=tuple(sorted(undefined)))
+    return ObjectFacts(sums["code"], sums["constants"], sums["data"], tuple(sorted(undefined)))
 
 
 def _undefined(table: bytes, names: bytes, of_symbol: str, short: bool) -> list[str]:

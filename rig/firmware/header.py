@@ -37,7 +37,8 @@ class _Records:
         """Declare a record with all that it holds; return its type in C."""
         if dtype.names is None:
             return SCALARS[dtype.str[1:]]
-        fields, checks = [], []
+        fields: list[str] = []
+        checks: list[str] = []
         for one in dtype.names:
             kind, offset = dtype.fields[one][:2]  # type: ignore[index]  # it has names
             shape = "".join(f"[{n}]" for n in kind.shape)
@@ -70,7 +71,8 @@ def header(arguments: Arguments, digest: str) -> str:
     """Return the header's text for the records of these arguments, with the digest of the kernels."""
     records, arrays = _Records(), arguments.by_name()
     types = {name: records.add(f"tick_{name}", array.dtype) for name, array in arrays.items()}
-    bundle, given = [], []
+    bundle: list[str] = []
+    given: list[str] = []
     for name, array in arguments.t._asdict().items():
         lengths = _counts(name, array)
         bundle += [f"    {types[name]} *{name};", f"    int64_t {', '.join(lengths)};"]
