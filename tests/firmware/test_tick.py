@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from rig.errors import ConfigurationError, RecordingError
+from rig.firmware import machine_code
 from rig.firmware.build import HEADER, build_tick
 from rig.firmware.header import header
 from rig.firmware.machine_code import kernels_digest
@@ -224,6 +225,13 @@ def test_a_back_end_that_llvmlite_has_not_is_named(monkeypatch):
     monkeypatch.setattr(llvm.Target, "from_triple", without)
     with refused(ConfigurationError, field="target", value="cortex-m7"):
         TARGETS["cortex-m7"].machine()
+
+
+def test_kernels_that_are_not_compiled_have_no_text(monkeypatch):
+    monkeypatch.setattr(type(tick_block), "_made", lambda kernel: kernel.py_func)
+    machine_code._text.cache_clear()
+    with refused(ConfigurationError):
+        machine_code.object_file(TARGETS["cortex-m7"])
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
