@@ -57,10 +57,14 @@ def object_file(target: Target) -> bytes:
 @cache
 def _text() -> tuple[str, str]:
     """Return the LLVM text of the tick with all that it calls, and the name of its function there."""
-    try:
-        return compiled_text(tick_block, *example())
-    except RuntimeError as error:
-        raise ConfigurationError(f"there is no LLVM text of the kernels: {error}") from None
+    import numba
+
+    config: Any = numba.config
+    if config.DISABLE_JIT:
+        raise ConfigurationError(
+            "there is no machine code of kernels that are not compiled", hint="unset NUMBA_DISABLE_JIT"
+        )
+    return compiled_text(tick_block, *example())
 
 
 def _for_target(text: str, target: Target, digest: str) -> str:
