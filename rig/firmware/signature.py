@@ -1,7 +1,7 @@
 """What the tick takes: its arrays, by name and type, whatever the bench."""
 
 from functools import cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick, TickSettings
 
-SHOWN = "magnet-beam"
+SHOWN: Final = "magnet-beam"
 """Bench whose tick shows the types; those of all benches are equal."""
 
 
