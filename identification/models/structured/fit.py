@@ -11,6 +11,7 @@ import numpy as np
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band, same_channels
+from identification.experiments.residuals import lacks_something, residual_over_noise
 from identification.fitting.levenberg_marquardt import Minimum
 from identification.fitting.result import FitResult
 from identification.fitting.threads import threads
@@ -21,7 +22,7 @@ from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
 from identification.models.structured.parameters import HIGHEST, Parameters
 from identification.models.structured.problem import ModalTest, Problem
-from identification.models.structured.start import linear_start, with_element, with_further_element
+from identification.models.structured.start import element_starts, linear_start, with_further_element
 from vibrolock.arrays import Float
 
 _ROUGH, _FINE = 3e-2, 2e-4
@@ -50,6 +51,8 @@ _SUPPORT = 0.01
 _TWO_SIDED_95 = 1.96
 _AT_BOUND = 1e-6
 """Relative distance within which a number is at a bound of the fit."""
+_STARTS = 4
+"""Most starts of the fit of one element, as long as noise does not explain the residual. Chosen."""
 _SHARE = 0.1
 """Steps of central differences relative to the standard errors of the numbers. Chosen."""
 
@@ -169,11 +172,14 @@ def fit_structured(
     kept: _Fitted | None = None
     for plan in wanted:
         if found.elements or plan.between:
-            start = with_further_element(found, experiments, nudged, plan, reach)
+            starts = [with_further_element(found, experiments, nudged, plan, reach)]
         else:
             with threads():  # its matrices are too small to share
-                start = with_element(found, experiments, nudged, plan.laws, reach)
-        fitted = _fitted(start, linear, modes, experiments, nudged, support is True)
+                starts = element_starts(found, experiments, nudged, plan.laws, reach)
+        fitted = _best_fitted(
+            starts[: _STARTS if len(wanted) == 1 else 1],  # of several, the first is expected to leave a residual
+            lambda start: _fitted(start, linear, modes, experiments, nudged, support is True),
+        )
         evaluations, iterations = evaluations + fitted.evaluations, iterations + fitted.iterations
         trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
         trials.append(trial)
@@ -206,6 +212,30 @@ class _Fitted(NamedTuple):
     last: Minimum
     evaluations: int
     iterations: int
+
+    def lacks_something(self) -> bool:
+        """Whether the residual of any experiment is more than noise and not small (`lacks_something`)."""
+        for experiment in self.problem.experiments:
+            simulated = self.model.simulate_experiment(experiment).outputs[:, experiment.counted_from :]
+            measured = experiment.counted_outputs
+            error = np.linalg.norm(simulated - measured, axis=1) / np.linalg.norm(measured, axis=1)
+            if np.any(lacks_something(residual_over_noise(experiment, simulated), error)):
+                return True
+        return False
+
+
+def _best_fitted(starts: Sequence[StructuredModel], fit: Callable[[StructuredModel], _Fitted]) -> _Fitted:
+    """Return the first fit whose residual the noise explains, or of all the one with the least error."""
+    fitted = []
+    for start in starts:
+        fitted.append(fit(start))
+        if not fitted[-1].lacks_something():
+            break
+    best = min(fitted, key=lambda one: one.problem.error(one.last.vector))
+    evaluations, iterations = (
+        sum(counts) for counts in zip(*((one.evaluations, one.iterations) for one in fitted), strict=True)
+    )
+    return best._replace(evaluations=evaluations, iterations=iterations)
 
 
 def _fitted(

@@ -65,20 +65,21 @@ def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> Stru
     )
 
 
-def with_element(
+def element_starts(
     linear: StructuredModel,
     experiments: Sequence[Experiment],
     measured_modes: int,
     laws: Sequence[Law],
     reach: float,
-) -> StructuredModel:
+) -> list[StructuredModel]:
     """Add an element along the mode that moves most: what is left of its equation of motion, by linear least squares.
 
     The modal coordinates of the periodic experiments come from their spectra. Sensors of acceleration do not show the mean
     position. A shift of it changes the coefficients of a polynomial, not the forces, so that the lines do not determine it.
     Static balance does: without a mean input the mean of mode and element is zero. Numbers in which a law is not linear are
-    tried (`Law.tried`); the combination with the least residual is taken. Mean positions in balance beyond the largest RMS are
-    not found. Raises `IdentificationError` if no experiment is periodic.
+    tried (`Law.tried`). Returned are the combinations with the least residual for each value of the first of these numbers,
+    such as the slip of a joint, the least first: the regression does not always rank them as a fit does. Mean positions in
+    balance beyond the largest RMS are not found. Raises `IdentificationError` if no experiment is periodic.
     """
     periodic = _periodic(experiments)
     coordinates = [modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
@@ -96,10 +97,12 @@ def with_element(
         _regression(parts, list(tried), places, linear.omega[mode], (shape, scale))
         for tried in product(*(law.candidates() for law in laws))
     ]
-    best = min(found, key=lambda one: one.residual)
     direction = np.zeros(len(linear.omega))
     direction[mode] = shape
-    return with_regression(linear, best, [mode], reach, (direction, ()))
+    best = dict[tuple[float, ...], Regression]()
+    for one in sorted(found, key=lambda one: one.residual):
+        best.setdefault(tuple(getattr(law, next(iter(law.tried))) for law in one.laws if law.tried), one)
+    return [with_regression(linear, one, [mode], reach, (direction, ())) for one in best.values()]
 
 
 def _periodic(experiments: Sequence[Experiment]) -> list[Experiment]:

@@ -3,15 +3,11 @@
 from typing import Any
 
 from identification import RunScatter
+from identification.experiments import EXPLAINED, lacks_something
 from rig.results.simulated.driven_models import DrivenModel
 from rig.results.simulated.model import SimulatedModel
 from rig.text.column import Column
 from rig.text.console import number, print_rows, print_table
-
-EXPLAINED = 3.0
-"""Residual over noise up to which noise explains the residual. Chosen: right structures fitted at 0.1 % noise came to 2.5."""
-SMALL = 2e-3
-"""Relative error up to which a residual is called small. Chosen: every law that fits the virtual magnet beam leaves 0.08 %."""
 
 
 def rows_of_scatter(of: RunScatter) -> list[dict[str, Any]]:
@@ -103,7 +99,7 @@ def noise_verdict(runs: list[dict[str, Any]]) -> str:
     largest, error, where = max(ratios)
     if largest <= EXPLAINED:
         return f"noise explains the residual of the training data: at most {largest:.2g} times the noise"
-    beyond = [one for one in ratios if one[0] > EXPLAINED and one[1] > SMALL]
+    beyond = [one for one in ratios if lacks_something(*one[:2])]
     if not beyond:
         return f"the residual is {largest:.3g} times the noise, but small, {100.0 * error:.2g} % ({where})"
     largest, error, where = max(beyond)
