@@ -57,5 +57,5 @@ def read_text(
         return read_bytes(path, largest_bytes, error).decode(encoding)
     except UnicodeDecodeError as failure:
         raise error(
-            f"{path}: is not text in {encoding.removesuffix('-sig').upper()} (byte {failure.start}: {failure.reason})"
+            f"{path}: is not {encoding.removesuffix('-sig').upper()} text (byte {failure.start}: {failure.reason})"
         ) from None

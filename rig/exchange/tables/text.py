@@ -70,7 +70,7 @@ def blocks(path: Path, encoding: str) -> Iterator[tuple[int, str]]:
         except UnicodeError as error:
             said = encoding.removesuffix("-sig").upper()
             reason = getattr(error, "reason", str(error))
-            raise ImportFailed(f"{path}: is not text in {said} (after line {number}: {reason})") from None
+            raise ImportFailed(f"{path}: is not {said} text (after line {number}: {reason})") from None
 
 
 def table_lines(blocks: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:

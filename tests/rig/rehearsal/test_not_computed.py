@@ -60,7 +60,7 @@ def test_a_twin_that_cannot_be_computed_is_counted_and_the_others_go_on():
     assert verdict.ends_well == Proportion(count=3, of=3)
     assert all(point.accepted == Proportion(count=3, of=3) for point in verdict.points)
     assert np.isfinite(verdict.duration_s.high)
-    says = "1 of 4 twins could not be computed (1 x ZeroDivisionError: float division by zero), all shares are of the others"
+    says = "1 of 4 twins could not be computed (1 x ZeroDivisionError: float division by zero); all shares are of the others"
     assert any(line.startswith(f"not computed    {says}") for line in lines(summary(found)))
     assert says in verdict_in_one_line(summary(found))
 

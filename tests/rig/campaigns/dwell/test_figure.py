@@ -25,7 +25,9 @@ def drawn(monkeypatch):
     """The axes of a dwell with this course, one more mean that was refused, and these limits."""
     refused = made_point(quality=Quality.REJECTED, result=DwellResult(cycles=400.0))
     monkeypatch.setattr(figure, "recorded_course", lambda recording: COURSE)
-    monkeypatch.setattr(figure, "points_of", lambda recording, kind: [refused, made_point(result=DwellResult())])
+    accepted = made_point(result=DwellResult())
+    monkeypatch.setattr(figure, "points_of", lambda recording, kind: [refused, accepted])
+    monkeypatch.setattr(figure, "accepted_points", lambda recording, kind: [accepted] * COURSE.cycles.size)
     monkeypatch.setattr(figure, "heading", lambda page, recording: None)
 
     def of(alarm=None, abort=None, **plan):
