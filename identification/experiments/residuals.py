@@ -1,6 +1,7 @@
 """What noise explains of the residual of a model."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from identification.experiments.experiment import Experiment
 from vibrolock.arrays import Bool, Complex, Float
@@ -20,7 +21,7 @@ SMALL = 2e-3
 """Relative error up to which a residual is called small. Chosen: every law that fits the virtual magnet beam leaves 0.08 %."""
 
 
-def lacks_something(over_noise: Float, error: Float) -> Bool:
+def lacks_something(over_noise: ArrayLike, error: ArrayLike) -> Bool:
     """Return whether a model lacks something or its fit ended in a local minimum, bool[n]: more than noise, and not small.
 
     ``over_noise`` is that of `residual_over_noise`, False where it is NaN; ``error`` is the relative RMS error, float[n].
