@@ -228,7 +228,12 @@ def _best_fitted(starts: Sequence[StructuredModel], fit: Callable[[StructuredMod
     """Return the first fit whose residual the noise explains, or of all the one with the least error."""
     fitted = []
     for start in starts:
-        fitted.append(fit(start))
+        try:
+            fitted.append(fit(start))
+        except IdentificationError:
+            if not fitted:
+                raise
+            continue  # a further start that cannot be fitted takes nothing from the first
         if not fitted[-1].lacks_something():
             break
     best = min(fitted, key=lambda one: one.problem.error(one.last.vector))

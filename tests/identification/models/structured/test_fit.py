@@ -1,6 +1,7 @@
 """Fits of structured models: known models come back, from many starts, with errors that hold."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from identification import Channel, IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.models.simulated_runs import simulated_run
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.fit import fit_structured, not_identified
+from identification.models.structured.fit import _best_fitted, fit_structured, not_identified
 from identification.models.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
@@ -131,6 +132,26 @@ def test_where_noise_does_not_explain_the_residual_the_fit_begins_again_elsewher
     once = fit_structured(linear_modes(true, 1), [data], support=False, laws=laws)
     assert once.training_error > 5e-3
     assert once.evaluations < found.evaluations
+
+
+def test_a_further_start_that_cannot_be_fitted_leaves_the_first_fit():
+    class Fitted(SimpleNamespace):
+        def lacks_something(self):
+            return True
+
+        def _replace(self, **changes):
+            return Fitted(**(vars(self) | changes))
+
+    def fit(start):
+        if start != "first":
+            raise IdentificationError("no minimum")
+        problem = SimpleNamespace(error=lambda _: 0.1)
+        return Fitted(start=start, problem=problem, last=SimpleNamespace(vector=None), evaluations=3, iterations=2)
+
+    found = _best_fitted(["first", "second"], fit)
+    assert (found.start, found.evaluations, found.iterations) == ("first", 3, 2)
+    with pytest.raises(IdentificationError):
+        _best_fitted(["second", "first"], fit)
 
 
 @pytest.mark.slow
