@@ -120,6 +120,11 @@ class FeedConnection(_Unread, WebSocketsSansIOProtocol):
         super().connection_made(transport)
         self._stuck = _Deadline(STUCK_S, self.transport.abort)
 
+    def shutdown(self) -> None:
+        """Say goodbye, unless the client has done so already: a second close frame is an error."""
+        if not self.transport.is_closing():
+            super().shutdown()
+
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""
         self._stuck.call_off()

@@ -2,6 +2,7 @@
 
 import json
 import os
+import queue
 import signal
 import socket
 import stat
@@ -15,6 +16,7 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.live import place
 from rig.live.publisher import Publisher
 from rig.monitor import opening, process
+from rig.monitor.connections import FeedConnection
 from rig.monitor.process import Address, PageServer
 from rig.monitor.sources import Latest, always, chosen
 from tests.refused import refused
@@ -49,6 +51,24 @@ def test_a_signal_ends_the_server_in_order(number, status, said):
             server.send_signal(number)
             _, err = server.communicate(timeout=LONG_S)
     assert (server.returncode, err) == (status, said)
+
+
+def test_a_server_ends_in_order_while_a_client_says_goodbye(monkeypatch):
+    ended = queue.SimpleQueue()
+    leaves = FeedConnection.handle_close
+
+    def leaves_as_the_server_ends(feed, event):
+        leaves(feed, event)
+        try:
+            feed.shutdown()
+            ended.put("in order")
+        except Exception as error:
+            ended.put(error)
+
+    monkeypatch.setattr(FeedConnection, "handle_close", leaves_as_the_server_ends)
+    with served(Scripted()) as server, Visitor(server.url).enter().feed():
+        pass
+    assert ended.get(timeout=LONG_S) == "in order"
 
 
 def test_a_port_that_is_taken_is_told_in_one_line():
