@@ -106,7 +106,7 @@ def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Non
             f"has {values.size} parameters",
             field="exciter",
             allowed=f"{len(PARAMETERS)} ({', '.join(PARAMETERS)})",
-            hint="identify it anew",
+            hint="identify it again",
         )
     for names, numbers in (
         (PARAMETERS, values),

@@ -106,7 +106,7 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
         return "switch"
     if request.unseen:
         raise NotArmed(
-            f"bench {bench.name}: a physical rig would move, and nobody has confirmed this: {'; '.join(request.unseen)}; run "
+            f"bench {bench.name}: a physical rig would move, and this has not been confirmed: {'; '.join(request.unseen)}; run "
             "at a terminal without `arm` and type the bench's name, or ask with a callable (arm=ask from Python)"
         )
     NotArmed.raise_if(request.unguarded and (arm or bench.arming.automated), request.unguarded_refusal)

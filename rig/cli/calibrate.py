@@ -138,7 +138,7 @@ def _print(found: "Calibrated", output: Path, rms_v: float | None, told: bool) -
             print(f"{one.name}: no cable; crosstalk {20.0 * math.log10(max(one.gain, 1e-12)):.0f} dB")
     if found.uncertain_gain > UNCERTAIN and not told:
         print(
-            "the inputs are alike: whether their corner or the other one is the output's cannot be told, so amplitudes at "
+            "the inputs are alike, so it is not known which corner is the output's: amplitudes at "
             f"{found.bench.specimen.linear_frequency_hz:g} Hz may be {100.0 * found.uncertain_gain:.1f} % wrong; phases are "
             "right (--output-high-pass)"
         )

@@ -29,7 +29,7 @@ def watch_(
         with _found(file) as run:
             told = watch(run)
     except KeyboardInterrupt:
-        print("watched no longer; a run goes on", file=sys.stderr)
+        print("stopped watching; the run continues", file=sys.stderr)
         return
     if not told:
         raise typer.Exit(1)

@@ -86,7 +86,7 @@ class LoopbackTests(LoopbackSteps):
             read_v = recorded.read[half][there[-1]]
             off_v = np.abs(read_v - side_v)
             assert off_v.max() <= GAIN_SHARE * level_v, (
-                f"{side_v:g} V were handed over and {read_v[off_v.argmax()]:.3g} V are put out, without a word: "
+                f"{side_v:g} V were handed over and {read_v[off_v.argmax()]:.3g} V come out, without an error: "
                 f"output_range_v is said to be {daq.output_range_v:g} V"
             )
 

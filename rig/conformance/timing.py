@@ -167,7 +167,7 @@ class TimingTests(DriverUnderTest):
                         daq.exchange(np.zeros(1))
                 except DaqError as error:
                     message = str(error)
-                assert message, "exchange went on without a device, or failed without a word"
+                assert message, "exchange went on without a device, or failed without a message"
                 closing_s = self.now_s(daq)
                 daq.close()
                 closed_s = self.now_s(daq)

@@ -63,7 +63,7 @@ class ShutdownMonitor:
             return Outcome(True, "output at 0 V" if alive else "output at 0 V, the run is over")
         if not alive:
             if end is None:
-                return Outcome(False, f"its process has ended without a word: {HARDWARE}")
+                return Outcome(False, f"its process ended unexpectedly: {HARDWARE}")
             return Outcome(frame is None, f"the run is over: {end}" + ("" if frame is None else f": {HARDWARE}"))
         if self._refused:
             return Outcome(False, f"{self._refused}: {HARDWARE}")
@@ -71,7 +71,7 @@ class ShutdownMonitor:
         longest_s = REST_S + (ramp_s if math.isfinite(ramp_s) else 0.0) if self._timeout_s is None else self._timeout_s
         if (waited_s := time.monotonic() - self._began_s) < longest_s:
             return None
-        last = "it has not begun; the request stays, and nothing is known of its output"
+        last = "it has not begun; the request stays, and the state of its output is not known"
         if frame is not None and guard is not None:
             last = f"guard {guard.name.lower()}, {float(frame.state['voltage_v']):.3f} V, {frame.age_s:.1f} s ago"
         return Outcome(False, f"not at 0 V within {waited_s:.1f} s ({last}): {HARDWARE}")

@@ -54,14 +54,14 @@ class Stopping:
         ``moment`` is None if the run cannot be read.
         """
         if moment is None:
-            return "failed", HARDWARE, "A stop may be asked for, but what the run does cannot be read."
+            return "failed", HARDWARE, "The run's state cannot be read. A stop can still be requested."
         shown = moment.shown or Shown("starting")
         now = shown.details
         cause = f" {shown.cause}." if shown.cause else ""
         if moment.view is None and self._kept and self._expecting():
-            return "asked", "STOP IS ASKED FOR", f"The run has not been heard of yet. If anything moves: {HARDWARE}."
+            return "asked", "STOP REQUESTED", f"The run has not reported yet. If anything moves: {HARDWARE}."
         if moment.view is None and self._expecting():
-            return "driven", "NOTHING IS KNOWN OF THE RUN", f"It is about to begin, or cannot be watched: {HARDWARE}."
+            return "driven", "THE RUN CANNOT BE SEEN", f"It may be about to begin, or may not be watchable: {HARDWARE}."
         if moment.view is None or moment.facts is None:
             return "none", "NO RUN IS UNDER WAY", "There is nothing to stop here."
         if moment.view.player is not None:
@@ -69,19 +69,19 @@ class Stopping:
         if not moment.connected:
             if shown.output_off or (moment.ended and now is None):  # the last: nothing was driven
                 return "off", "OUTPUT AT 0 V", f"The run is over.{cause}"
-            how = cause or " Its process has ended without a word."
-            return "failed", HARDWARE, f"The run is over, and what the output does is not known here.{how}"
+            how = cause or " Its process ended unexpectedly."
+            return "failed", HARDWARE, f"The run is over; whether its output is at 0 V is not known.{how}"
         if shown.output_off and cause:
             return "off", "OUTPUT AT 0 V", cause.strip()
         if self._asked is not moment.view:
-            return "driven", "NO STOP WAS ASKED FOR", f"The run is under way: {shown.state}."
+            return "driven", "NO STOP REQUESTED", f"The run is under way: {shown.state}."
         if self._refused:
-            return "failed", HARDWARE, f"The request could not be left: {self._refused}."
+            return "failed", HARDWARE, f"The stop request could not be stored: {self._refused}."
         if now is not None and now.age_s > SILENT_S:
-            return "failed", HARDWARE, f"A stop is asked for, but the run has said nothing for {now.age_s:.0f} s."
+            return "failed", HARDWARE, f"A stop was requested, but the run has not reported for {now.age_s:.0f} s."
         waited_s = time.monotonic() - self._asked_s
         if waited_s > moment.facts.limits.ramp_down_s + REST_S:
             return "failed", HARDWARE, f"The output is not at 0 V after {waited_s:.0f} s.{cause}"
         if now is not None and now.guard == "ramping down":
             return "ramping", "RAMPING DOWN", f"Output {now.voltage_v:.3f} V.{cause}"
-        return "asked", "STOP IS ASKED FOR", "The ramp begins as soon as the run looks, twenty times a second."
+        return "asked", "STOP REQUESTED", "The run looks for requests twenty times a second, then ramps down."

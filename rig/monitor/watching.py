@@ -20,7 +20,7 @@ DRAWINGS_PER_S = 5.0
 """Rate at which the terminal is drawn, 1/s; chosen: as quick as numbers can be read."""
 JUMPS = 20
 """Jumps of an arrow key that a whole recording takes; chosen."""
-DEAD = "its process has ended without a word: what the output does is not known, USE THE HARDWARE STOP"
+DEAD = "its process ended unexpectedly: whether its output is at 0 V is not known, USE THE HARDWARE STOP"
 Keys = Callable[[], str]
 
 

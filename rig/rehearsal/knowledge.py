@@ -97,7 +97,7 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
         _plant(found, bench, plant, ratios)
     if found.responses is None and not (found.exciter and found.shape):
         raise ConfigurationError(
-            f"nothing is known of the exciter and the structure of the bench {bench.name}: give a recording of "
+            f"there is no measurement of the exciter and the structure of the bench {bench.name}: give a recording of "
             "`rig tune` or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a "
             "virtual bench can be its own twin with `exact`",
             field="sources",

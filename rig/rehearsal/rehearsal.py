@@ -300,7 +300,7 @@ def _completed_draws(journal: Path, request: RehearsalRequest, begin_anew: bool)
             return {}
         raise RecordingError(
             f"{journal}: holds the draws of another rehearsal (another plan, bench, knowledge, seed or version); "
-            "`overwrite` to begin anew"
+            "`overwrite` to start over"
         )
     if len(tables) < len(lines):
         discard_draws(journal)

@@ -44,7 +44,7 @@ def say_how_it_ended(summary: dict[str, Any], path: Path, pure_plan: str = "") -
     _print_where_explained(summary)
     if last["tripped"] and not summary["complete"]:
         print(
-            f"what was accepted is kept; then `rig resume {path} --plan PLAN.toml` goes on by a changed plan, "
+            f"what was accepted is kept; then `rig resume {path} --plan PLAN.toml` continues with a changed plan, "
             f"`rig resume {path} --retry-tripped` by the same"
         )
     elif not summary["complete"]:

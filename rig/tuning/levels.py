@@ -167,7 +167,7 @@ def choose_levels(
     if not 0.0 < first < highest:
         raise ConfigurationError(
             f"levels from {first:.3g} m to {highest:.3g} m: allowed is a lowest level above 0 and below the highest; the "
-            f"force can be told from {told:.3g} m on"
+            f"force is above the noise from {told:.3g} m on"
         )
     levels = (
         tuple(float(f"{level:.4g}") for level in np.geomspace(first, highest, points)) if points > 1 else (highest,)

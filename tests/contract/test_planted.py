@@ -83,7 +83,7 @@ def objection_or_doubt(contract, test):
 @pytest.mark.parametrize("fault", PLANTED, ids=lambda fault: fault.driver.__name__)
 def test_the_kit_fails_a_planted_fault_in_the_test_that_names_it(fault):
     said = objection(OverADriver(fault.driver), fault.test)
-    assert said.partition(": ")[2], "passed, or failed without a word"
+    assert said.partition(": ")[2], "passed, or failed without a message"
 
 
 @pytest.mark.parametrize("driver", [*GOOD, ContinuingDAQ], ids=lambda driver: driver.__name__)

@@ -74,7 +74,7 @@ def test_the_kit_names_the_rule_that_is_broken(driver, test, conformance):
     assert done.status == 1
     failed = {one["test"]: one["detail"] for one in json.loads(done.out)["tests"] if one["outcome"] == "failed"}
     assert test in failed
-    assert all(text.partition(": ")[2] for text in failed.values()), "a failure without a word"
+    assert all(text.partition(": ")[2] for text in failed.values()), "a failure without a message"
 
 
 def test_a_driver_that_keeps_all_rules_passes_in_words_and_the_command_succeeds(conformance):

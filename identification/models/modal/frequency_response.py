@@ -42,7 +42,9 @@ def mode_response(mode: NonlinearMode, request: SteadyRequest) -> SteadyPredicti
     one = OneMode(properties, fundamental_of(mode, level, force))
     paths, notes = _branches(one, level)
     if not paths:
-        raise IdentificationError("too small for a response that can be told from rest", field="force_n", value=level)
+        raise IdentificationError(
+            "too small: the response cannot be distinguished from rest", field="force_n", value=level
+        )
     if force == "rms":
         notes.append(
             "the force's harmonics per fundamental are those recorded at phase resonance, off resonance as well"

@@ -29,8 +29,8 @@ def with_force_harmonics(
     others = {order: error for order, error in off.items() if order not in alone}
     if alone:
         point = point.warned(
-            f"harmonics {', '.join(map(str, alone))} of channel {facts.name} were not controlled: their plant could not "
-            f"be told from noise; they are off by up to {100.0 * max(off[order] for order in alone):.2g} % of the fundamental"
+            f"harmonics {', '.join(map(str, alone))} of channel {facts.name} were not controlled: their response is "
+            f"lost in noise; they are off by up to {100.0 * max(off[order] for order in alone):.2g} % of the fundamental"
         )
     if not others:
         return point

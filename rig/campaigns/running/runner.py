@@ -222,7 +222,7 @@ class _Run:
             with open_session(self.bench, seed, realtime=self.options.realtime) as session:
                 if session.latched:
                     progress.remark(
-                        f"nothing is measured again: {session.latched}; `rig resume {self.output}` goes on once armed"
+                        f"nothing is measured again: {session.latched}; `rig resume {self.output}` continues once armed"
                     )
                     return Recording(self.output)
                 if self.live.stop_requested:  # while the device was opened

@@ -99,7 +99,7 @@ def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
     holes = np.flatnonzero(steps_s > 1.5 * float(np.median(steps_s)))
     where = ", ".join(f"{transient.frequency_hz[hole]:.3f}" for hole in holes[:5])
     more = " Hz and more" if holes.size > 5 else " Hz"
-    return [f"nothing is known about {where}{more}: samples were lost"] if where else []
+    return [f"not measured at {where}{more}: samples were lost"] if where else []
 
 
 def _level_objection(plan: SweepPlan, error: float) -> str:

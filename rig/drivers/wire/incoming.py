@@ -193,9 +193,7 @@ class Incoming:
             self.on_answer(message)
         elif isinstance(message, Heartbeat):
             if message.boot != self._boot:
-                raise DaqReset(
-                    f"{self._link.name}: the device has started anew in the middle of the run; its output is 0 V"
-                )
+                raise DaqReset(f"{self._link.name}: the device restarted during the run; its output is 0 V")
             if message.flags & STOPPED:
                 self._raise_stopped(message.flags)
             self._unarmed_beats = self._unarmed_beats + 1 if message.state != DeviceState.ARMED else 0

@@ -163,7 +163,7 @@ class WallClockLoop(DrivenLoop):
     def _account(self) -> None:
         response = self.times.done()
         if response > self._stall_ns and not self._pace.by_device:
-            self._end(f"the loop stood still for {1e-9 * response:.1f} s")
+            self._end(f"the loop stalled for {1e-9 * response:.1f} s")
 
     def _hand_over(self) -> None:
         """Complete the chunk that was filled last, if there is one; it is still to be announced.

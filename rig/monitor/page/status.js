@@ -141,7 +141,7 @@ export class Status {
       live: this.message?.replay ? "replay of a recording" : this.feed.polled ? "live, without a socket" : "live",
       stale: "stale: nothing new for a second",
       over: "the run is over",
-      died: "the run's process ended without a word",
+      died: "the run's process ended unexpectedly",
       gone: "no answer from the monitor",
     }[connection];
   }

@@ -74,8 +74,8 @@ def remark(found: IdentifiedPnlss, path: Path) -> Remark | None:
     if found.fit is None or not (found.fit.limited or found.fit.interrupted):
         return None
     if found.fit.interrupted:
-        return Remark(f"interrupted; the best so far is in {path}, and --resume goes on", unfinished=True)
-    return Remark(f"the fit was {found.fit.message}; --resume with more --iterations goes on")
+        return Remark(f"interrupted; the best so far is in {path}, and --resume continues the fit", unfinished=True)
+    return Remark(f"the fit was {found.fit.message}; --resume with more --iterations continues it")
 
 
 def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:

@@ -53,7 +53,7 @@ class PnlssOptions(FitDataOptions):
             self._check_function()
         for name in _OF_THE_FIT if self.resume is not None else ():
             if name in self.model_fields_set:
-                raise ConfigurationError(f"`{name}`: is that of the fit that goes on; leave it out")
+                raise ConfigurationError(f"`{name}`: is set by the fit that is resumed; leave it out")
         return self
 
     def _check_function(self) -> None:

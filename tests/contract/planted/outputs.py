@@ -76,7 +76,7 @@ class AddsALot(VirtualDAQ):
 
 @planted("voltages_up_to_the_range_are_put_out")
 class ClipsAtHalfTheRange(VirtualDAQ):
-    """Outputs are clipped at half the range, without a word."""
+    """Outputs are clipped at half the range, without an error."""
 
     def _exchange(self, voltages, inputs):
         half = 0.5 * self.output_range_v

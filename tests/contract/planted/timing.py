@@ -113,7 +113,7 @@ class GoesOnWhenGone(TimedDAQ):
 
 @planted(GONE)
 class SaysNothingWhenGone(TimedDAQ):
-    """An error without a word when unplugged."""
+    """An error without a message when unplugged."""
 
     def _exchange(self, voltages, inputs):
         if not self.plugged:

@@ -125,7 +125,7 @@ def test_arrays_that_lack_something_are_refused() -> None:
         decode(Exciter, arrays, attributes)
     arrays["values"] = TRUE.values[:-1]  # as earlier files have them
     with refused(
-        IdentificationError, "has-parameters-allowed-identify-it-anew", field="exciter", hint="identify it anew"
+        IdentificationError, "has-parameters-allowed-identify-it-again", field="exciter", hint="identify it again"
     ):
         decode(Exciter, arrays, attributes)
 

@@ -102,7 +102,7 @@ def words_for(fault: Fault) -> tuple[str, ...]:
         "drops-all": ("lost", "no samples", "watchdog"),
         "emergency-stop": ("emergency stop",),
         "unplugged": ("unplugged",),
-        "reset": ("anew",),
+        "reset": ("restarted",),
         "deaf": ("watchdog", "no answer"),
         "silent": ("silent", "no samples", "nothing"),
         "repeats": ("on channel ",),

@@ -132,7 +132,7 @@ def test_a_run_that_does_not_answer_or_is_killed_wants_the_hardware_stop(command
     child.kill()
     out, _ = stopping.communicate(timeout=120)
     assert stopping.returncode == 1
-    assert "its process has ended without a word: USE THE HARDWARE STOP" in out
+    assert "its process ended unexpectedly: USE THE HARDWARE STOP" in out
     wait_until(lambda: not any(alive(pid) for pid in loop), "the loop's process follows the run's")
 
 
@@ -143,7 +143,7 @@ def test_what_a_killed_run_has_left_is_named_and_wants_the_hardware_stop(command
     for line in ("stop", "stop run.h5"):
         status, out, _ = command(line)
         assert status == 1
-        assert out.endswith("its process has ended without a word: USE THE HARDWARE STOP\n")
+        assert out.endswith("its process ended unexpectedly: USE THE HARDWARE STOP\n")
     assert command("stop other.h5")[0] == 1
 
 
@@ -179,7 +179,7 @@ def test_ctrl_c_ends_the_watching_and_leaves_the_run(running):
     watching.stdout.readline()
     watching.send_signal(signal.SIGINT)
     _, err = watching.communicate(timeout=120)
-    assert (watching.returncode, err) == (0, "watched no longer; a run goes on\n")
+    assert (watching.returncode, err) == (0, "stopped watching; the run continues\n")
     assert child.poll() is None
     assert driven("run.h5")
 

@@ -387,7 +387,7 @@ def run_until_error(faults: Faults, lockstep: bool = False) -> tuple[MemoryDAQ, 
     [
         (Faults(silent_after_s=0.1), DaqTimeout, "has not come within 0.25 s"),
         (Faults(deaf_after_s=0.1), DaqWatchdog, "watchdog"),
-        (Faults(reset_after_s=0.1), DaqReset, "started anew"),
+        (Faults(reset_after_s=0.1), DaqReset, "restarted during"),
         (Faults(late_every=100, late_s=1.0), DaqTimeout, "has not come"),
     ],
 )

@@ -62,7 +62,7 @@ def test_the_form_brings_a_run_to_0_v(tmp_path):
             answer = inside.get("/stopping")
             said.append(heading(answer))
         assert said[-1] == "OUTPUT AT 0 V"
-        assert set(said) <= {"STOP IS ASKED FOR", "RAMPING DOWN", "OUTPUT AT 0 V"}
+        assert set(said) <= {"STOP REQUESTED", "RAMPING DOWN", "OUTPUT AT 0 V"}
         printed, _ = campaign.communicate()
         wait_until(lambda: not inside.state()["connected"], "the run's end")
         last = inside.get("/stopping")
@@ -81,8 +81,8 @@ def test_the_form_brings_a_run_to_0_v(tmp_path):
 
 
 def test_from_asked_over_ramping_to_0_v(run, inside):
-    assert heading(inside.get("/stopping")) == "NO STOP WAS ASKED FOR"
-    assert heading(inside.stop()) == "STOP IS ASKED FOR"
+    assert heading(inside.get("/stopping")) == "NO STOP REQUESTED"
+    assert heading(inside.stop()) == "STOP REQUESTED"
     assert run.stops == ["stopped on the page"]
     run.step(GuardMode.RAMPING, EndReason.STOP_REQUESTED, voltage_v=0.321)
     ramping = inside.get("/stopping")
@@ -97,7 +97,7 @@ def test_from_asked_over_ramping_to_0_v(run, inside):
 def test_a_script_gets_the_same_as_data(run, inside):
     answer = inside.stop(Accept="application/json")
     assert answer.headers["content-type"] == "application/json"
-    assert answer.text.startswith('{"state":"asked","text":"STOP IS ASKED FOR.')
+    assert answer.text.startswith('{"state":"asked","text":"STOP REQUESTED.')
     run.step(GuardMode.OFF, EndReason.STOP_REQUESTED)
     assert '"state":"off"' in inside.get("/stopping", Accept="application/json").text
     assert '"state":"failed"' in inside.stop(Accept="application/json", Origin="null").text
@@ -136,7 +136,7 @@ def test_a_run_that_has_died_says_to_use_the_hardware_stop(run, inside):
     run.connected = False
     answer = inside.stop()
     assert heading(answer) == "USE THE HARDWARE STOP"
-    assert "without a word" in answer.text
+    assert "ended unexpectedly" in answer.text
 
 
 def test_a_run_that_ended_with_its_output_on_says_to_use_the_hardware_stop(run, inside):
@@ -210,9 +210,9 @@ def test_a_request_for_a_run_that_has_not_begun_is_kept_for_it(run):
 
     with served(look, stopping=kept) as server:
         inside = Visitor(server.url).enter()
-        assert heading(inside.get("/stopping")) == "NOTHING IS KNOWN OF THE RUN"
+        assert heading(inside.get("/stopping")) == "THE RUN CANNOT BE SEEN"
         answer = inside.stop()
-        assert heading(answer) == "STOP IS ASKED FOR"
+        assert heading(answer) == "STOP REQUESTED"
         assert onward(answer)
         assert "USE THE HARDWARE STOP" in answer.text
         begun.append(True)

@@ -53,7 +53,7 @@ def test_a_run_is_stopped_by_the_page_under_attack(tmp_path, scheme, kind, numbe
         assert page.stdout is not None
         newcomer = Visitor(address_in(page.stdout.readline()), tls).enter()
         said = [heading(newcomer.stop())]
-        while said[-1] in ("STOP IS ASKED FOR", "RAMPING DOWN"):
+        while said[-1] in ("STOP REQUESTED", "RAMPING DOWN"):
             said.append(heading(operator.get("/stopping")))
         assert said[-1] == "OUTPUT AT 0 V"
         printed, _ = run.communicate()

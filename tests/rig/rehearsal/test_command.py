@@ -52,7 +52,7 @@ def test_a_twin_is_written_and_an_improved_plan_too(command):
     [
         (
             ["plan.toml", "-o", "r.h5"],
-            "--from: nothing is known of the exciter and the structure of the bench magnet-beam",
+            "--from: there is no measurement of the exciter and the structure of the bench magnet-beam",
         ),
         (["plan.toml", "--exact", "-o", "r.txt"], "rehearsals are written as .h5"),
         (["plan.toml", "--exact", "-o", "missing/r.h5"], "there is no folder missing"),

@@ -141,7 +141,7 @@ def test_a_stop_by_a_signal_is_recorded_with_its_name(tmp_path, noting):
         folder = tmp_path / str(attempt)
         folder.mkdir()
         text = _text_of_a_run_that_got_sigterm(folder, noting)
-        if "stood still" not in text:
+        if "stalled" not in text:
             break
     assert text == "stopped by request (SIGTERM)"
 

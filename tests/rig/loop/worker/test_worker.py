@@ -191,7 +191,7 @@ def test_a_loop_that_stood_still_ramps_down_and_says_how_long(tmp_path, noting):
 
     with WorkerSession(bench) as session:
         _, loop = ran(session, tone(bench, 60.0), halt)
-    stood_s = re.fullmatch(r"the loop stood still for ([0-9.]+) s.*", loop.cause)
+    stood_s = re.fullmatch(r"the loop stalled for ([0-9.]+) s.*", loop.cause)
     assert stood_s is not None, loop.cause
     assert float(stood_s[1]) > 1.0
     assert loop.statistics.overruns >= 1
