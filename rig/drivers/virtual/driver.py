@@ -23,6 +23,7 @@ from vibrolock.compiled import bound
 from vibrolock.one_thread import one_thread
 
 FACT_TOLERANCE = 1e-3  # relative difference from the bench that is worth a remark; chosen: as facts are rounded
+IMAGE_TOLERANCE = 0.01  # relative change of the damping ratio that is worth a remark; chosen
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
 COUNTED = (*(str(flag.name).lower() for flag in Flag), *FAULT_FLAGS, "lost_samples")
 GROWTH = 1e-3  # a step; of a plant that does not grow there is rounding alone, far below
@@ -155,13 +156,7 @@ class VirtualDAQ(DAQ):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Where the bench's facts differ from what the virtual rig is made of."""
-        out = []
-        if self.sample_rate_hz < LOWEST_INTERNAL_RATE_HZ and not self.rig.converter.anti_alias_hz:
-            out.append(
-                f"sample_rate_hz = {self.sample_rate_hz:g}: the stairs of the held output alias into the readings below "
-                f"about {LOWEST_INTERNAL_RATE_HZ:g} Hz, for the virtual device has no anti-alias filter "
-                "(driver.options.converter: oversampling, anti_alias_hz)"
-            )
+        out = self._images()
         delays = self.rig.channel_delays_samples
         for channel, sensor, delay in zip(self.channels[: delays.size], self.rig.sensors, delays, strict=True):
             said, has = channel.sensitivity_v_per_unit, sensor.sensitivity_v_per_unit
@@ -188,6 +183,27 @@ class VirtualDAQ(DAQ):
                 f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g}: the virtual specimen has {frequency_hz:.6g} Hz"
             )
         return tuple(out)
+
+    def _images(self) -> list[str]:
+        """What the images of the held output do, where no filter keeps them out of the readings."""
+        if self.rig.converter.anti_alias_hz:
+            return []
+        from simulators.analysis import image_bias  # a rig with filters is opened without it
+
+        cure = "the virtual device has no anti-alias filter (driver.options.converter: oversampling, anti_alias_hz)"
+        names = {channel.role: channel.name for channel in reversed(self.channels)}
+        bias = image_bias(self.rig, self._specimen.linear_frequency_hz, force=names["force"], drive=names["drive"])
+        if abs(bias.damping) > IMAGE_TOLERANCE:
+            return [
+                f"images of the held output change the damping ratio of the linear mode by {100.0 * bias.damping:+.2g} % of "
+                f"itself, its frequency by {100.0 * bias.frequency:+.2g} %, which the standard errors do not include: {cure}"
+            ]
+        if self.sample_rate_hz < LOWEST_INTERNAL_RATE_HZ:
+            return [
+                f"sample_rate_hz = {self.sample_rate_hz:g}: the stairs of the held output alias into the readings below "
+                f"about {LOWEST_INTERNAL_RATE_HZ:g} Hz, for {cure}"
+            ]
+        return []
 
     @property
     def capabilities(self) -> Capabilities:

@@ -1,3 +1,4 @@
+import re
 from typing import Any
 
 import numpy as np
@@ -45,10 +46,20 @@ def test_slow_bench_with_filters_reads_the_damping_of_a_fast_one() -> None:
     assert slow == pytest.approx(fast, rel=2e-3)
 
 
-def test_slow_bench_without_filters_reads_it_wrong_and_says_so() -> None:
+def test_slow_bench_without_filters_reads_it_wrong_and_says_by_how_much() -> None:
     bench = slow_bench(substeps=20)
-    assert any("sample_rate_hz = 800" in remark and "anti_alias_hz" in remark for remark in make_daq(bench).remarks)
-    assert last_damping(bench)[0] > 1.1 * last_damping(bench_with())[0]
+    (remark,) = make_daq(bench).remarks
+    said = re.search(r"change the damping ratio of the linear mode by ([+-]\d+) % .* anti_alias_hz", remark)
+    assert said is not None
+    lowest = (last_damping(bench) / last_damping(bench_with()))[0]
+    assert 100.0 * (lowest - 1.0) == pytest.approx(float(said[1]), abs=1.0)
+
+
+def test_slow_bench_without_filters_and_with_little_bias_still_says_that_the_output_aliases(monkeypatch) -> None:
+    monkeypatch.setattr("rig.drivers.virtual.driver.IMAGE_TOLERANCE", 1.0)
+    (remark,) = make_daq(slow_bench(substeps=20)).remarks
+    assert remark.startswith("sample_rate_hz = 800: the stairs of the held output alias")
+    assert "anti_alias_hz" in remark
 
 
 def test_slow_bench_with_filters_gives_no_remark() -> None:
