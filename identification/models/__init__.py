@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from identification.models.pnlss.error_table import SAME_LEVEL as SAME_LEVEL, ModelTest as ModelTest
     from identification.models.pnlss.features import FUNCTIONS as FUNCTIONS
     from identification.models.pnlss.user_functions import is_users as is_users
-    from identification.models.structured.fit import drawn as drawn, not_identified as not_identified, std_of as std_of
+    from identification.models.structured.fit import drawn as drawn, std_of as std_of
+    from identification.models.structured.identified import FittedNumber as FittedNumber
     from identification.models.structured.laws import (
         LAWS as LAWS,
         Damper as Damper,

@@ -17,6 +17,7 @@ from identification.fitting.result import FitResult
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan, ElementTrial
+from identification.models.structured.identified import FittedNumber, fitted_numbers
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
@@ -48,9 +49,6 @@ _LARGEST_STATIC = 10.0
 """Largest static force relative to the largest RMS of the training forces."""
 _SUPPORT = 0.01
 """Initial stiffness of the support relative to the first mode's at the drive point. Chosen."""
-_TWO_SIDED_95 = 1.96
-_AT_BOUND = 1e-6
-"""Relative distance within which a number is at a bound of the fit."""
 _STARTS = 4
 """Most starts of the fit of one element, as long as noise does not explain the residual. Chosen."""
 _SHARE = 0.1
@@ -80,6 +78,9 @@ class StructuredFit(FitResult):
         Which elements were fitted, and what they brought.
     steps_left
         Share of the errors of the simulation's steps that no change of the numbers makes up for; 1 if unknown.
+    unseen
+        Names of free numbers on which the training data do not depend, or only together with others. The covariance has zeros
+        there, or too little.
     """
 
     model: StructuredModel
@@ -90,6 +91,7 @@ class StructuredFit(FitResult):
     training_error: float
     trials: tuple[ElementTrial, ...] = ()
     steps_left: float = 1.0
+    unseen: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -98,6 +100,16 @@ class StructuredFit(FitResult):
                 f"structured fit: {count} names, but values of shape {np.shape(self.values)} and a covariance of shape "
                 f"{np.shape(self.covariance)}"
             )
+
+    @property
+    def numbers(self) -> tuple[FittedNumber, ...]:
+        """Frequencies, damping ratios, and numbers of laws and support with 95 % intervals, in their units."""
+        return fitted_numbers(_parameters_of(self), self.values, self.covariance, self.unseen)
+
+    @property
+    def not_identified(self) -> tuple[str, ...]:
+        """Names of those of `numbers` that the data do not tell: at a bound of the fit, or with an interval wider than they."""
+        return tuple(number.name for number in self.numbers if number.unknown)
 
 
 def fit_structured(
@@ -187,7 +199,7 @@ def fit_structured(
             break
         kept, found = fitted, fitted.model
     assert kept is not None  # the first element is always kept
-    covariance, steps_left = kept.problem.uncertainty(kept.last.vector)
+    covariance, steps_left, unseen = kept.problem.uncertainty(kept.last.vector)
     return StructuredFit(
         model=kept.model.trained_with(experiments),
         start=kept.start,
@@ -202,6 +214,7 @@ def fit_structured(
         message=kept.last.ending.message,
         trials=tuple(trials),
         steps_left=steps_left,
+        unseen=tuple(name for name, one in zip(kept.problem.parameters.names, unseen, strict=True) if one),
     )
 
 
@@ -295,23 +308,6 @@ def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> 
         more, less = (quantity(parameters.model(fit.values + sign * step)) for sign in (1.0, -1.0))
         parts.append((more - less) / (2.0 * _SHARE))
     return np.asarray(np.linalg.norm(parts, axis=0))
-
-
-def not_identified(fit: StructuredFit) -> tuple[str, ...]:
-    """Return which frequencies, damping ratios and support the data do not tell, by their names in the fit.
-
-    Their values are at a bound of the fit, or their 95 % intervals reach zero. Frequencies and damping ratios are fitted by
-    their logarithms: their intervals are relative ones.
-    """
-    parameters, std = _parameters_of(fit), np.sqrt(np.diag(fit.covariance))
-    at_bound = [np.isclose(fit.values, bound, rtol=_AT_BOUND, atol=0.0) for bound in parameters.bounds(fit.values)]
-    size = np.where(np.array([name == "support" for name in fit.names]), np.abs(fit.values), 1.0)
-    unknown = at_bound[0] | at_bound[1] | (_TWO_SIDED_95 * std >= size)
-    return tuple(
-        name
-        for name, one in zip(fit.names, unknown, strict=True)
-        if one and name.startswith(("frequency ", "damping ", "support"))
-    )
 
 
 def drawn(fit: StructuredFit, count: int, seed: int = 0) -> Iterator[StructuredModel]:

@@ -35,6 +35,9 @@ class Transform(NamedTuple):
     """Least value of what the fit moves."""
     span: float = np.inf
     """Largest distance of what the fit moves from its initial value."""
+    size: float | None = None
+    """Width of an interval from which on the number is not identified; None for the number itself. Of a number whose zero means
+    nothing, such as an exponent: half of its range."""
 
 
 def _between(low: float, high: float) -> Transform:
@@ -44,6 +47,7 @@ def _between(low: float, high: float) -> Transform:
         lambda v: middle + half * np.tanh(np.clip(v, -8.0, 8.0)),
         f"between {low:g} and {high:g}",
         span=4.0,
+        size=half,
     )
 
 
@@ -88,6 +92,11 @@ class Law:
         return tuple(out)
 
     @property
+    def transforms(self) -> tuple[Transform, ...]:
+        """How a fit moves each of `names`."""
+        return tuple(transform for name, transform in self.free.items() for _ in range(np.size(getattr(self, name))))
+
+    @property
     def n_linear(self) -> int:
         """Number of the numbers in which the law is linear."""
         return np.size(getattr(self, self.linear)) if self.linear else 0
@@ -108,10 +117,7 @@ class Law:
     @property
     def bounds(self) -> Float:
         """float[2, P], least and largest values of `vector` in a fit that begins at these numbers."""
-        sizes = [np.size(getattr(self, name)) for name in self.free]
-        least, span = (
-            np.repeat([getattr(transform, of) for transform in self.free.values()], sizes) for of in ("least", "span")
-        )
+        least, span = (np.array([getattr(one, of) for one in self.transforms]) for of in ("least", "span"))
         return np.array([np.maximum(self.vector - span, least), self.vector + span])
 
     def moved(self, vector: Float) -> Self:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.models.structured.elements import NonlinearElement, derivative_tables_of, laws_in_order
+from identification.models.structured.laws import FROM_ZERO, POSITIVE, Transform
 from identification.models.structured.model import StructuredModel, outputs_of, workspace_for
 from identification.models.structured.nudging import Nudging, ends_of_steps, not_led, update_support
 from identification.models.structured.sensitivities import Sensitivities, run_with_sensitivities
@@ -59,6 +60,16 @@ class Parameters:
         out += [f"shape {i + 1} at {self.start.outputs[o].name}" for o in self._untied for i in range(modes)]
         out += [f"direct {channel.name} {of.name}" for channel in self.start.outputs for of in self.start.inputs]
         return tuple(out)
+
+    @property
+    def transforms(self) -> tuple[Transform | None, ...]:
+        """How each of `names` follows from the vector; None for components of shapes and directions, and ``direct``."""
+        shapes = self.start.input_shapes.size + sum(len(self._kept(element)) for element in self.start.elements)
+        laws = [
+            one for e, law in laws_in_order(self.start.elements) for one in self.start.elements[e].laws[law].transforms
+        ]
+        before = [*[POSITIVE] * (2 * self._poles), *[None] * shapes, *laws, *[FROM_ZERO] * self.support]
+        return (*before, *[None] * (len(self.names) - len(before)))
 
     @property
     def _untied(self) -> list[int]:

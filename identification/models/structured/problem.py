@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
@@ -25,6 +26,8 @@ _EVALUATIONS = 100
 
 _FREQUENCY_STD, _DAMPING_STD, _SHAPE_STD, _RESIDUAL_STD = 1e-3, 0.1, 0.02, 0.3
 """What a modal test is trusted to: relative errors that are added to its own, and those of the residual mode."""
+_UNSEEN = 0.01
+"""Share of a number in what the data do not show above which they do not tell it. Chosen."""
 _STEP = 1e-6
 """Step of the differences, of logarithms and relative to shapes; so large is their error."""
 
@@ -115,9 +118,10 @@ class Problem:
         parts, tested = self._rows(self._of_one, vector)
         return qr_r(np.concatenate([*parts, self._misfit * tested]))
 
-    def uncertainty(self, vector: Float) -> tuple[Float, float]:
-        """Return the covariance of the numbers, and the share of the steps' errors that no change of the numbers makes up for.
+    def uncertainty(self, vector: Float) -> tuple[Float, float, NDArray[np.bool_]]:
+        """Return the covariance, the share of the steps' errors that no change of the numbers makes up for, and what is unseen.
 
+        Unseen, bool[P], are numbers on which the data do not depend, or only together with others.
         The covariance is float[P, P], as if the residual of each experiment were white, with a size of its own.
         The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment; and what the steps of the
         simulation move, to first order, as one error that all numbers share. Errors of outputs fall with the square of the
@@ -126,7 +130,7 @@ class Problem:
         parts, tested = self._rows(self._with_finer, vector)
         tested = self._misfit * np.insert(tested, -1, 0.0, axis=1)
         rows = np.concatenate([*parts, tested])
-        inverse = np.linalg.pinv(rows[:, :-2].T @ rows[:, :-2])
+        inverse, unseen = _inverse(rows[:, :-2].T @ rows[:, :-2])
         freedom = max(1.0 - vector.size / self.count, 0.5)
         told = self.error(vector) * tested[:, :-2]
         middle = told.T @ told
@@ -137,7 +141,8 @@ class Problem:
         covariance = np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
         column = qr_r(rows[:, :-1])[:, -1]
         whole = float(np.linalg.norm(column))
-        return covariance, float(abs(column[vector.size]) / whole) if whole > 0.0 and column.size > vector.size else 1.0
+        left = float(abs(column[vector.size]) / whole) if whole > 0.0 and column.size > vector.size else 1.0
+        return covariance, left, unseen
 
     def _rows(self, of_one: Callable[..., Float], vector: Float) -> tuple[list[Float], Float]:
         """Return what ``of_one`` gives for each experiment, and the rows of the modal test."""
@@ -185,3 +190,16 @@ class Problem:
         if found.ending.status is FitStatus.INTERRUPTED:
             raise KeyboardInterrupt
         return found
+
+
+def _inverse(normal: Float) -> tuple[Float, NDArray[np.bool_]]:
+    """Return the inverse of a normal matrix, float[P, P], without what no data show, and bool[P], the numbers in that.
+
+    Columns are taken relative to their norms: a number in large units, such as a stiffness, has small derivatives.
+    """
+    norms = np.sqrt(np.diag(normal))
+    scale = np.where(norms > 0.0, norms, 1.0)
+    values, axes = np.linalg.eigh(normal / np.outer(scale, scale))
+    kept = values > values.size * np.finfo(float).eps * values[-1]
+    inverse = (axes[:, kept] / values[kept]) @ axes[:, kept].T / np.outer(scale, scale)
+    return np.asarray(inverse), np.sum(axes[:, ~kept] ** 2, axis=1) > _UNSEEN

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
-from identification.models import Joint, not_identified, std_of
+from identification.models import FittedNumber, Joint, std_of
 from rig.results.kind import Table
 from rig.results.simulated.table import say_errors, say_scatter, summary_of
 from rig.results.structured.model import IdentifiedStructured
@@ -78,6 +78,11 @@ def _element(element: NonlinearElement) -> dict[str, Any]:
     }
 
 
+def _number(number: FittedNumber) -> dict[str, Any]:
+    finite = {end: value if np.isfinite(value) else None for end, value in (("low", number.low), ("high", number.high))}
+    return number._asdict() | finite
+
+
 def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
     model, fit = found.model, found.fit
     fitted, at_rest = _linear_part(model, fit), _small_vibrations(found)
@@ -89,7 +94,8 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
         "elements": [_element(element) for element in model.elements],
         "joints": any(isinstance(law, Joint) for element in model.elements for law in element.laws),
         "support_n_m": model.support_n_m,
-        "not_identified": [] if fit is None else list(not_identified(fit)),
+        "numbers": [] if fit is None else [_number(one) for one in fit.numbers],
+        "not_identified": [] if fit is None else list(fit.not_identified),
         "fit": None
         if fit is None
         else {
@@ -138,15 +144,30 @@ def _say(summary: dict[str, Any]) -> None:
         *(Column(str(i), f"direction {i + 1}", "", ".4f") for i in range(modes)),
     )
     _say_trials([] if summary["fit"] is None else summary["fit"]["trials"])
-    if summary["support_n_m"] > _LEAST_SUPPORT_N_M:
-        known = "support" not in summary["not_identified"]
-        value = f"{number(summary['support_n_m'], '.4g')} N/m" if known else "not identified"
-        print(f"unseen support at the drive point: {value}")
-    if unknown := [name for name in summary["not_identified"] if name != "support"]:
-        named = ", ".join(name.replace(" ", " of mode ") for name in unknown)
-        print(f"not identified (at a bound of the fit, or with an interval that reaches 0): {named}")
+    _say_numbers(summary)
     say_scatter(summary["scatter"])
     say_errors(summary)
+
+
+def _say_numbers(summary: dict[str, Any]) -> None:
+    """Numbers of laws and support, then which modes are not identified."""
+    of_modes = ("frequency ", "damping ")
+    if told := [one for one in summary["numbers"] if not one["name"].startswith(of_modes)]:
+        print("fitted numbers; displacements relative to the largest in training, support in N/m")
+        print_rows(
+            [
+                one | {"value": f"not identified: {one['unknown']}" if one["unknown"] else f"{one['value']:.4g}"}
+                for one in told
+            ],
+            Column("name", "number"),
+            Column("value", "value"),
+            Column("low", "95 % from", "", ".4g"),
+            Column("high", "to", "", ".4g"),
+        )
+    if summary["support_n_m"] > _LEAST_SUPPORT_N_M and "support" not in [one["name"] for one in told]:
+        print(f"unseen support at the drive point: {number(summary['support_n_m'], '.4g')} N/m")
+    if unknown := [name for name in summary["not_identified"] if name.startswith(of_modes)]:
+        print(f"not identified: {', '.join(name.replace(' ', ' of mode ') for name in unknown)}")
 
 
 def _say_trials(trials: list[dict[str, Any]]) -> None:

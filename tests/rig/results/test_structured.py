@@ -105,6 +105,23 @@ def test_errors_of_modes_that_no_law_moves_are_those_of_the_fit(there, recording
         assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-2, abs=1e-12)
 
 
+def test_numbers_that_the_data_do_not_tell_are_said_to_be_not_identified(there, recordings):
+    found = load(recordings / "S.h5")
+    fit, at = found.fit, found.fit.names.index("element 1 polynomial-spring coefficients_n[0]")
+    values, covariance = fit.values.copy(), fit.covariance.copy()
+    values[at], covariance[at, at] = 2.0, 1.5**2
+    changed = replace(fit, values=values, covariance=covariance, unseen=("support",))
+    save(replace(found, fit=changed), recordings / "unknown.h5")
+    assert load(recordings / "unknown.h5").fit.not_identified == changed.not_identified
+    told = json.loads(there("show unknown.h5 --json").out)
+    assert {fit.names[at], "support"} <= set(told["not_identified"])
+    said = [line.split() for line in there("show unknown.h5").out.splitlines()]
+    assert [*fit.names[at].split(), "not", "identified:", "wide", "-0.94", "4.94"] in said
+    assert ["support", "not", "identified:", "no", "effect", "-", "-"] in said
+    known = fit.names[at + 1] if fit.names[at + 1] not in fit.not_identified else None
+    assert known is None or not any(line[:4] == known.split() and "not" in line for line in said)
+
+
 def test_the_residual_is_compared_with_the_noise(there):
     said = there("show S.h5").out.splitlines()
     (heading,) = (line for line in said if "range use" in line)

@@ -10,7 +10,7 @@ from identification import Channel, IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.models.simulated_runs import simulated_run
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.fit import _best_fitted, fit_structured, not_identified
+from identification.models.structured.fit import _best_fitted, fit_structured
 from identification.models.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
@@ -66,7 +66,11 @@ def test_the_static_force_that_no_sensor_shows_is_found():
     data = [replace(one, outputs=true.simulate_experiment(one).outputs) for one in data]
     found = fit_structured(linear_modes(true, 1), data)
     assert found.model.support_n_m == pytest.approx(1500.0, rel=0.05)
-    assert not_identified(found) == ()
+    without_truth = {
+        "element 1 polynomial-spring coefficients_n[4]",
+        "element 1 polynomial-damper coefficients_n_s_m[1]",
+    }
+    assert set(found.not_identified) <= without_truth  # both are zero
     without = fit_structured(linear_modes(true, 1), data, support=False)
     assert found.training_error < 0.2 * without.training_error
 
@@ -75,8 +79,8 @@ def test_a_support_that_the_data_do_not_show_is_said_to_be_not_identified():
     linear = beam(elements=(), support_n_m=0.0)
     data = [experiment(linear, noise=0.01)]
     found = fit_structured(linear_modes(linear, 1), data, laws=(PolynomialSpring((0.0,)),))
-    unknown = not_identified(found)
-    assert "support" in unknown
+    unknown = found.not_identified
+    assert {"support", "element 1 polynomial-spring coefficients_n[0]"} <= set(unknown)
     assert not {"frequency 1", "damping 1"} & set(unknown)  # the second mode lies above the band
 
 
@@ -115,6 +119,7 @@ def test_noise_explains_the_residual_of_a_right_structure_and_not_of_a_wrong_one
     ratio = simulated_run(found.model, data, steps_left=found.steps_left).over_noise
     assert np.all(ratio < largest)
     assert np.all(ratio > least)
+    assert not any("jenkins" in name for name in found.not_identified)  # it slips
 
 
 def test_where_noise_does_not_explain_the_residual_the_fit_begins_again_elsewhere(monkeypatch):
