@@ -28,6 +28,8 @@ _FREQUENCY_STD, _DAMPING_STD, _SHAPE_STD, _RESIDUAL_STD = 1e-3, 0.1, 0.02, 0.3
 """What a modal test is trusted to: relative errors that are added to its own, and those of the residual mode."""
 _UNSEEN = 0.01
 """Share of a number in what the data do not show above which they do not tell it. Chosen."""
+_LEFT_OUT = 1e-15
+"""Eigenvalue of the normal matrix relative to the largest up to which no data show its direction."""
 _STEP = 1e-6
 """Step of the differences, of logarithms and relative to shapes; so large is their error."""
 
@@ -195,11 +197,14 @@ class Problem:
 def _inverse(normal: Float) -> tuple[Float, NDArray[np.bool_]]:
     """Return the inverse of a normal matrix, float[P, P], without what no data show, and bool[P], the numbers in that.
 
-    Columns are taken relative to their norms: a number in large units, such as a stiffness, has small derivatives.
+    Columns are in the units of the numbers, so that one in large units, such as a stiffness that is too large to
+    matter, is left out too. Numbers that only count together are looked for with columns of unit norm.
     """
     norms = np.sqrt(np.diag(normal))
     scale = np.where(norms > 0.0, norms, 1.0)
     values, axes = np.linalg.eigh(normal / np.outer(scale, scale))
-    kept = values > values.size * np.finfo(float).eps * values[-1]
-    inverse = (axes[:, kept] / values[kept]) @ axes[:, kept].T / np.outer(scale, scale)
-    return np.asarray(inverse), np.sum(axes[:, ~kept] ** 2, axis=1) > _UNSEEN
+    together = axes[:, values <= values.size * np.finfo(float).eps * values[-1]]
+    values, axes = np.linalg.eigh(normal)
+    kept = values > _LEFT_OUT * values[-1]
+    unseen = np.maximum(np.sum(together**2, axis=1), np.sum(axes[:, ~kept] ** 2, axis=1)) > _UNSEEN
+    return np.asarray((axes[:, kept] / values[kept]) @ axes[:, kept].T), unseen
