@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from identification.experiments.time_experiments import time_experiments as time_experiments
     from identification.experiments.time_records import TimeRecord as TimeRecord, TimeRecords as TimeRecords
     from identification.experiments.time_responses import time_responses as time_responses, time_spectra as time_spectra
+    from identification.fitting.result import FitProgress as FitProgress
     from identification.frequency_responses import (
         FrequencyResponse as FrequencyResponse,
         pack_frequency_responses as pack_frequency_responses,
@@ -157,7 +158,6 @@ if TYPE_CHECKING:
     from identification.models.pnlss.fitting.fit import fit_pnlss as fit_pnlss
     from identification.models.pnlss.fitting.result import (
         FitHistory as FitHistory,
-        FitProgress as FitProgress,
         FitSettings as FitSettings,
         PnlssFit as PnlssFit,
     )

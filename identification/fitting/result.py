@@ -51,6 +51,36 @@ MESSAGES = {
 """Sentence of each status; what is in braces is filled in where the fit ends."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class FitProgress:
+    """Progress of a fit.
+
+    Parameters
+    ----------
+    iteration, iterations
+        Number of this iteration, and the largest number of iterations.
+    training_error, validation_error
+        Relative RMS errors; NaN without validation data, inf for an unbounded run.
+    damping
+        Damping of the step to this iterate; NaN if it is not told.
+    seconds
+        Time since the fit began.
+    stage
+        ``start 3 of 8`` while starts are compared, or the stage of a fit in stages; else empty.
+    usual_s
+        Least and largest time that such a fit usually takes, s, from that of its first linearisation; None if unknown.
+    """
+
+    iteration: int
+    iterations: int
+    training_error: float
+    validation_error: float
+    damping: float
+    seconds: float
+    stage: str = ""
+    usual_s: tuple[float, float] | None = None
+
+
 class Ending(NamedTuple):
     """Why the iterations ended."""
 

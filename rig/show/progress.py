@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.show.point_warnings import quality_in_short
-from rig.show.waiting import heard
+from rig.show.waiting import heard, say_beside
 from rig.text.console import number
+from rig.text.durations import duration
 from rig.text.levels import level_text
 from vibrolock.printable import printable
 
@@ -115,6 +116,7 @@ class FitLines(_StatusLine):
         self._best = (float("inf"), 0)
         self._stage = ""
         self._said_s = 0.0
+        self._usual = ""
 
     def __call__(self, at: "FitProgress") -> None:
         """Show the current iteration of the fit, and the best one so far."""
@@ -124,10 +126,16 @@ class FitLines(_StatusLine):
             self._stage, self._best = at.stage, (float("inf"), 0)
         self._best = min(self._best, (judged, at.iteration))
         stage = f"{at.stage}: " if at.stage else ""
+        errors = f"training {_percent(at.training_error)}  "
+        if at.validation_error == at.validation_error:
+            errors += f"validation {_percent(at.validation_error)}  "
         line = (
-            f"{stage}iteration {at.iteration:>3}/{at.iterations}  training {_percent(at.training_error)}  "
-            f"validation {_percent(at.validation_error)}  best at {self._best[1]}  {at.seconds:.1f} s"
+            f"{stage}iteration {at.iteration:>3}/{at.iterations}  {errors}best at {self._best[1]}  {at.seconds:.1f} s"
         )
+        if at.usual_s is not None:
+            self._usual = f"a fit of this size usually takes {duration(at.usual_s[0])} to {duration(at.usual_s[1])}"
+        if self._usual and say_beside(self._usual):
+            self._usual = ""
         if self._terminal:
             self._status(line)
         elif at.iteration % self._EVERY == 0 or at.seconds - self._said_s >= self._LONGEST_S:

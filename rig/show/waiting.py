@@ -39,10 +39,9 @@ def silence() -> Iterator[None]:
         heard()
 
 
-def say_beside(text: str) -> None:
-    """Say something else that makes a command slow, with its time; nothing if it is quick so far."""
-    if _Silence.waiting and not _Silence.wanted:
-        _Silence.waiting[0].beside(text)
+def say_beside(text: str) -> bool:
+    """Say something else about a slow command, with its time, and return True; do nothing if it is quick so far."""
+    return bool(_Silence.waiting) and not _Silence.wanted and _Silence.waiting[0].beside(text)
 
 
 class Waiting:
@@ -80,10 +79,12 @@ class Waiting:
         self._what, self._usual = what, usual
         self._say()
 
-    def beside(self, text: str) -> None:
-        """Say ``text``, unless the command is quick so far."""
-        if time.monotonic() - self._began_s >= FIRST_S:
-            self._print(text)
+    def beside(self, text: str) -> bool:
+        """Say ``text`` and return True, unless the command is quick so far."""
+        if time.monotonic() - self._began_s < FIRST_S:
+            return False
+        self._print(text)
+        return True
 
     def _watch(self) -> None:
         while not self._over.wait(0.1):

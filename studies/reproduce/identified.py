@@ -1,5 +1,6 @@
 """Models of a study. Each is identified once and stored as soon as it is finished."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -29,6 +30,7 @@ from rig.results.files import load_as, save
 from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.simulated.data_files import uses_of
 from rig.results.structured.model import IdentifiedStructured
+from rig.text.durations import duration
 from studies.reproduce.options import Options
 from studies.reproduce.recordings import exciter_of, recorded
 
@@ -101,6 +103,7 @@ def identify_all(
     failures: dict[str, str] = {}
     identify: Callable[..., Any] = _structured(options, say) if options.model == "structured" else _pnlss(options)
     fit_all = partial(_fit, identify, options.shifts)
+    begun, kept_count = time.perf_counter(), len(fits)
     for found in identify_many(jobs, fit_all, n_jobs=options.jobs, done=fits):
         if found.fit is None:
             failures[found.name] = found.reason
@@ -112,9 +115,17 @@ def identify_all(
             kind = _kind(options)
             one = kind(model=fit.model, fit=fit, seconds=found.seconds, uses=uses_of(*data), scatter=shifts)
             save(one.on(*data, _runs(*data) if shifts else ()), files[found.name])
-        count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
-        say(f"{count}  {_outcome(fits.get(found.name), scatter.get(found.name), found.reason)}  {found.seconds:.1f} s")
+        done = len(fits) + len(failures)
+        count = f"model {done:>3}/{len(jobs)}  {found.name:12}"
+        left = _time_left(time.perf_counter() - begun, done - kept_count, len(jobs) - done)
+        said = _outcome(fits.get(found.name), scatter.get(found.name), found.reason)
+        say(f"{count}  {said}  {found.seconds:.1f} s{left}")
     return Models(jobs, fits, failures, scatter)
+
+
+def _time_left(taken_s: float, done: int, left: int) -> str:
+    """Return how long the models that are left take at the pace of those that are done, in words; empty if none is left."""
+    return f", the other {left} some {duration(taken_s / done * left)}" if left else ""
 
 
 def _runs(training: Sequence[Experiment], validation: Sequence[Experiment]) -> list[str]:

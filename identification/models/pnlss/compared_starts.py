@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from identification.experiments.experiment import Experiment
-from identification.fitting.result import Ending, FitStatus
+from identification.fitting.result import Ending, FitProgress, FitStatus
 from identification.models.pnlss.fitting.fit import fit_pnlss
-from identification.models.pnlss.fitting.result import FitProgress, FitSettings, PnlssFit
+from identification.models.pnlss.fitting.result import FitSettings, PnlssFit
 from identification.models.pnlss.model import PnlssModel
 
 STARTS = 4  # random starts that are compared; chosen

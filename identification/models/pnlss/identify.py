@@ -13,12 +13,13 @@ import numpy as np
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
+from identification.fitting.result import FitProgress
 from identification.linear.subspace import StateSpace
 from identification.models.pnlss.compared_starts import STARTS, best_of_starts, interrupted
 from identification.models.pnlss.features import Features
 from identification.models.pnlss.fitting.checks import check_enough, check_signals
 from identification.models.pnlss.fitting.fit import fit_pnlss
-from identification.models.pnlss.fitting.result import FitProgress, FitSettings, PnlssFit
+from identification.models.pnlss.fitting.result import FitSettings, PnlssFit
 from identification.models.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.models.pnlss.model import PnlssModel
 from identification.models.pnlss.saturating_starts import saturating_starts

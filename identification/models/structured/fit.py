@@ -13,7 +13,7 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band, same_channels
 from identification.experiments.residuals import lacks_something, residual_over_noise
 from identification.fitting.levenberg_marquardt import Minimum
-from identification.fitting.result import FitResult
+from identification.fitting.result import FitProgress, FitResult
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan, ElementTrial
@@ -22,7 +22,8 @@ from identification.models.structured.laws import Law, PolynomialDamper, Polynom
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
 from identification.models.structured.parameters import HIGHEST, Parameters
-from identification.models.structured.problem import ModalTest, Problem
+from identification.models.structured.problem import EVALUATIONS, ModalTest, Problem
+from identification.models.structured.progress import FitWatch
 from identification.models.structured.start import element_starts, linear_start, with_further_element
 from vibrolock.arrays import Float
 
@@ -122,6 +123,7 @@ def fit_structured(
     reach: float = 3.0,
     support: bool | float = True,
     steps: int | None = None,
+    progress: Callable[[FitProgress], None] | None = None,
 ) -> StructuredFit:
     """Fit a structured model with one nonlinear element whose direction is free, or with several.
 
@@ -154,6 +156,8 @@ def fit_structured(
     steps
         Steps in a sample; None for a hundred in a period of the highest excited frequency, two in a sample at least. Errors of
         the simulation fall with their square: with 23 in a period they were 1.3 % of a response of the magnet beam.
+    progress
+        Called after every linearisation (`FitProgress`).
     """
     began = time.perf_counter()
     same_channels(experiments)
@@ -173,6 +177,7 @@ def fit_structured(
         steps = _LEAST if band is None else max(_LEAST, math.ceil(_PER_PERIOD * band[1] / first.sample_rate_hz))
     IdentificationError.unless_at_least("steps", steps, 1)
     wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
+    watch = FitWatch(progress, len(wanted), EVALUATIONS)
     linear = linear_start(modes, first, steps)
     linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     nudged = min(len(modes.frequency_hz), len(first.outputs))  # modes whose motion the outputs tell apart
@@ -190,7 +195,7 @@ def fit_structured(
                 starts = element_starts(found, experiments, nudged, plan.laws, reach)
         fitted = _best_fitted(
             starts[: _STARTS if len(wanted) == 1 else 1],  # of several, the first is expected to leave a residual
-            lambda start: _fitted(start, linear, modes, experiments, nudged, support is True),
+            lambda start: _fitted(start, linear, modes, experiments, nudged, support is True, watch),
         )
         evaluations, iterations = evaluations + fitted.evaluations, iterations + fitted.iterations
         trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
@@ -263,6 +268,7 @@ def _fitted(
     experiments: Sequence[Experiment],
     nudged: int,
     support: bool,
+    watch: FitWatch,
 ) -> _Fitted:
     """Fit all numbers, in stages with smaller and smaller nudging forces."""
     tied = (find_role(start.outputs, "drive"),)
@@ -274,7 +280,8 @@ def _fitted(
     needed = 1.2 * float(np.max(start.frequency_hz)) / (HIGHEST * start.sample_rate_hz)
     rough = min(start.steps, max(math.ceil(0.5 * start.steps), math.ceil(needed)))
     slowest = float(np.min((linear.omega * linear.damping_ratio)[:nudged]))
-    for ratio, free, turned in _STAGES[support]:
+    for number, (ratio, free, turned) in enumerate(_STAGES[support], 1):
+        watch.begin(f"stage {number} of {len(_STAGES[support])}")
         if free and not found.support_n_m:
             found = replace(found, support_n_m=stiffness)
         # the last fit runs without nudging for so long before it counts that its effect has decayed
@@ -288,7 +295,7 @@ def _fitted(
             for e, count in zip(settled, lengths, strict=True)
         ]
         parameters = Parameters(begun, tied, free, turned, poles)
-        problem = Problem(parameters, settled, nudgings, ModalTest(parameters, modes, linear), misfit)
+        problem = Problem(parameters, settled, nudgings, ModalTest(parameters, modes, linear), misfit, watch)
         end = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found = parameters.model(end.vector)
         evaluations, iterations = evaluations + end.evaluations, iterations + end.iterations

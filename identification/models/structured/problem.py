@@ -1,5 +1,7 @@
 """The least-squares problem of a structured model in the time domain: residuals of experiments, and what a modal test says."""
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -19,9 +21,10 @@ from identification.models.structured.elements import at_rest
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging
 from identification.models.structured.parameters import Parameters
+from identification.models.structured.progress import FitWatch
 from vibrolock.arrays import Float
 
-_EVALUATIONS = 100
+EVALUATIONS = 100
 """Simulations with derivatives at most. Chosen: fits of the benchmarks end after some ten."""
 
 _FREQUENCY_STD, _DAMPING_STD, _SHAPE_STD, _RESIDUAL_STD = 1e-3, 0.1, 0.02, 0.3
@@ -95,9 +98,10 @@ class Problem:
         nudgings: Sequence[Nudging | None],
         test: ModalTest,
         misfit: float,
+        watch: FitWatch,
     ) -> None:
         self.parameters, self.experiments, self.nudgings = parameters, experiments, nudgings
-        self._test, self._misfit = test, misfit
+        self._test, self._misfit, self._watch = test, misfit, watch
         outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
         self.count = outputs.size
         self._scale = np.sqrt(np.mean(outputs**2, axis=1))
@@ -117,8 +121,12 @@ class Problem:
 
     def triangle(self, vector: Float) -> Float:
         """float[P + 1, P + 1]: triangle of derivatives and residuals of experiments and of what is expected."""
+        began_s = time.perf_counter()
         parts, tested = self._rows(self._of_one, vector)
-        return qr_r(np.concatenate([*parts, self._misfit * tested]))
+        found = qr_r(np.concatenate([*parts, self._misfit * tested]))
+        error = math.sqrt(sum(float(part[:, -1] @ part[:, -1]) for part in parts) / self.count)
+        self._watch.linearised(error, time.perf_counter() - began_s)
+        return found
 
     def uncertainty(self, vector: Float) -> tuple[Float, float, NDArray[np.bool_]]:
         """Return the covariance, the share of the steps' errors that no change of the numbers makes up for, and what is unseen.
@@ -188,7 +196,7 @@ class Problem:
     def solve(self, vector: Float, tolerance: float) -> Minimum:
         """Return the minimum; iterations end when one gains and promises less than ``tolerance`` of the cost."""
         bounds = self.parameters.bounds(vector)
-        found = bounded_minimum(self.triangle, self._cost, vector, bounds, tolerance, _EVALUATIONS)
+        found = bounded_minimum(self.triangle, self._cost, vector, bounds, tolerance, EVALUATIONS)
         if found.ending.status is FitStatus.INTERRUPTED:
             raise KeyboardInterrupt
         return found

@@ -42,6 +42,7 @@ def identify(
             validation=validation,
             elements=options.elements(),
             support=True if known is None else known,
+            progress=progress,
         ),
         data,
         options.scatter,

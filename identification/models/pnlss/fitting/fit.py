@@ -13,13 +13,13 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band
 from identification.fitting.levenberg_marquardt import DampingRule, Minimum, Step, minimise
-from identification.fitting.result import Ending, FitStatus
+from identification.fitting.result import Ending, FitProgress, FitStatus
 from identification.fitting.threads import threads
 from identification.models.pnlss.fitting.blocks import fitted_initial_state
 from identification.models.pnlss.fitting.checks import check_data, check_memory, check_resumed
 from identification.models.pnlss.fitting.parameters import Parameters
 from identification.models.pnlss.fitting.problem import Problem, scales_of
-from identification.models.pnlss.fitting.result import FitHistory, FitProgress, FitSettings, PnlssFit
+from identification.models.pnlss.fitting.result import FitHistory, FitSettings, PnlssFit
 from identification.models.pnlss.model import PnlssModel
 from vibrolock.arrays import Float
 

@@ -101,33 +101,6 @@ class FitSettings:
         return self.band_hz is not None or bool(self.line_weights)
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitProgress:
-    """Progress of a fit.
-
-    Parameters
-    ----------
-    iteration, iterations
-        Number of this iteration, and the largest number of iterations.
-    training_error, validation_error
-        Relative RMS errors; NaN without validation data, inf for an unbounded run.
-    damping
-        Damping of the step to this iterate.
-    seconds
-        Time since the fit began.
-    stage
-        ``start 3 of 8`` while starts are compared; empty in the fit itself.
-    """
-
-    iteration: int
-    iterations: int
-    training_error: float
-    validation_error: float
-    damping: float
-    seconds: float
-    stage: str = ""
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FitHistory:
     """Errors over the iterations, the start first.

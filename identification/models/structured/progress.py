@@ -1,0 +1,44 @@
+"""Progress of a structured fit: its stage, iteration and error, and how long it will usually take."""
+
+import math
+import time
+from collections.abc import Callable
+
+from identification.fitting.result import FitProgress
+
+_FIRST_LINEARISATIONS = 2
+"""The first one also loads machine code, so the second one is timed."""
+_LEAST, _MOST = 30.0, 120.0
+"""Usual time of a fit of one element in times of such a linearisation: 40 to 100 were measured on the magnet beam."""
+
+
+class FitWatch:
+    """Calls ``progress`` after every linearisation of a fit with so many elements, ``iterations`` at most in a stage."""
+
+    def __init__(self, progress: Callable[[FitProgress], None] | None, elements: int, iterations: int) -> None:
+        self._progress, self._elements, self._iterations = progress, elements, iterations
+        self._began_s = time.perf_counter()
+        self._stage, self._iteration, self._seen = "", 0, 0
+
+    def begin(self, stage: str) -> None:
+        """Note that a stage begins."""
+        self._stage, self._iteration = stage, 0
+
+    def linearised(self, error: float, took_s: float) -> None:
+        """Note a linearisation: the relative error before it, and how long it took."""
+        self._seen += 1
+        if self._progress is not None:
+            timed = self._seen == _FIRST_LINEARISATIONS
+            self._progress(
+                FitProgress(
+                    iteration=self._iteration,
+                    iterations=self._iterations,
+                    training_error=error,
+                    validation_error=math.nan,
+                    damping=math.nan,
+                    seconds=time.perf_counter() - self._began_s,
+                    stage=self._stage,
+                    usual_s=(_LEAST * self._elements * took_s, _MOST * self._elements * took_s) if timed else None,
+                )
+            )
+        self._iteration += 1
