@@ -31,8 +31,6 @@ _FREQUENCY_STD, _DAMPING_STD, _SHAPE_STD, _RESIDUAL_STD = 1e-3, 0.1, 0.02, 0.3
 """What a modal test is trusted to: relative errors that are added to its own, and those of the residual mode."""
 _UNSEEN = 0.01
 """Share of a number in what the data do not show above which they do not tell it. Chosen."""
-_LEFT_OUT = 1e-15
-"""Eigenvalue of the normal matrix relative to the largest up to which no data show its direction."""
 _STEP = 1e-6
 """Step of the differences, of logarithms and relative to shapes; so large is their error."""
 
@@ -140,7 +138,7 @@ class Problem:
         parts, tested = self._rows(self._with_finer, vector)
         tested = self._misfit * np.insert(tested, -1, 0.0, axis=1)
         rows = np.concatenate([*parts, tested])
-        inverse, unseen = _inverse(rows[:, :-2].T @ rows[:, :-2])
+        inverse, unseen = _inverse(rows[:, :-2])
         freedom = max(1.0 - vector.size / self.count, 0.5)
         told = self.error(vector) * tested[:, :-2]
         middle = told.T @ told
@@ -202,17 +200,15 @@ class Problem:
         return found
 
 
-def _inverse(normal: Float) -> tuple[Float, NDArray[np.bool_]]:
-    """Return the inverse of a normal matrix, float[P, P], without what no data show, and bool[P], the numbers in that.
+def _inverse(rows: Float) -> tuple[Float, NDArray[np.bool_]]:
+    """Return the inverse of ``rows.T @ rows``, float[P, P], without what no row shows, and bool[P], the numbers in that.
 
-    Columns are in the units of the numbers, so that one in large units, such as a stiffness that is too large to
-    matter, is left out too. Numbers that only count together are looked for with columns of unit norm.
+    Columns are taken relative to their norms: a number in large units, such as a stiffness, has small derivatives. Singular
+    values of the rows reach as far as rounding does, which eigenvalues of their products do to its root only.
     """
-    norms = np.sqrt(np.diag(normal))
+    norms = np.linalg.norm(rows, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
-    values, axes = np.linalg.eigh(normal / np.outer(scale, scale))
-    together = axes[:, values <= values.size * np.finfo(float).eps * values[-1]]
-    values, axes = np.linalg.eigh(normal)
-    kept = values > _LEFT_OUT * values[-1]
-    unseen = np.maximum(np.sum(together**2, axis=1), np.sum(axes[:, ~kept] ** 2, axis=1)) > _UNSEEN
-    return np.asarray((axes[:, kept] / values[kept]) @ axes[:, kept].T), unseen
+    _, values, axes = np.linalg.svd(rows / scale, full_matrices=False)
+    kept = axes[values > max(rows.shape) * np.finfo(float).eps * values[0]]
+    over = kept / values[: kept.shape[0], None]
+    return np.asarray(over.T @ over / np.outer(scale, scale)), 1.0 - np.sum(kept**2, axis=0) > _UNSEEN

@@ -125,7 +125,9 @@ def test_its_backbone_lies_on_that_which_is_measured(model, command, monkeypatch
     done = command("plot ST.h5 backbone.h5 NM.h5 -o over.png")
     assert done.status == 0, done.err
     measured, found = load(model.parent / "NM.h5"), structured_mode(load(model).fit)
-    assert found.modal_frequency_std_hz.max() < 0.01
+    # At small amplitudes no more is known than what the modal test is trusted to; at those of the training data, more.
+    assert found.modal_frequency_std_hz.max() < 1e-3 * found.modal_frequency_hz.max()
+    assert found.modal_frequency_std_hz.min() < 1e-4 * found.modal_frequency_hz.max()
     inside = measured.amplitude_m < found.amplitude_m.max()
     assert inside.sum() > 3
     at = measured.amplitude_m[inside]

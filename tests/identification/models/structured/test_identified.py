@@ -9,6 +9,7 @@ from identification.models.structured.identified import fitted_numbers
 from identification.models.structured.laws import Iwan, Jenkins, PolynomialSpring
 from identification.models.structured.parameters import Parameters
 from identification.models.structured.problem import ModalTest, Problem, _inverse
+from identification.models.structured.progress import FitWatch
 from tests.identification.models.structured.models import beam, linear_modes
 from tests.identification.models.structured.test_fit import experiment
 
@@ -76,21 +77,21 @@ def test_what_no_data_show_has_no_interval():
     assert np.isnan([found.low, found.high]).all()
 
 
-def test_what_the_inverse_leaves_out_is_unseen():
-    """A normal matrix of three numbers, the second of 1e-9 times the size, the third without any effect."""
-    columns = np.random.default_rng(1).standard_normal((20, 3)) * [1.0, 1e-9, 0.0]
-    found, unseen = _inverse(columns.T @ columns)
-    assert unseen.tolist() == [False, True, True]
-    np.testing.assert_allclose(found, np.linalg.pinv(columns.T @ columns), rtol=1e-9, atol=1e-12)
-    columns = np.random.default_rng(1).standard_normal((20, 2)) * [1.0, 1e-5]
-    found, unseen = _inverse(columns.T @ columns)
-    assert not unseen.any()
-    np.testing.assert_allclose(found, np.linalg.inv(columns.T @ columns), rtol=1e-6, atol=1e-3)
+def test_units_do_not_count_and_what_no_row_shows_is_left_out():
+    rows = np.random.default_rng(1).standard_normal((20, 3)) * [1.0, 1e-9, 0.0]
+    found, unseen = _inverse(rows)
+    assert unseen.tolist() == [False, False, True]
+    units = np.array([1.0, 1e-9])
+    exact = np.linalg.inv((rows[:, :2] / units).T @ (rows[:, :2] / units)) / np.outer(units, units)
+    np.testing.assert_allclose(found[:2, :2], exact, rtol=1e-9)
+    assert not found[2].any()
 
 
 def test_numbers_that_count_only_together_are_not_identified():
-    columns = np.random.default_rng(1).standard_normal((20, 2))[:, [0, 1, 1]]
-    assert _inverse(columns.T @ columns)[1].tolist() == [False, True, True]
+    rows = np.random.default_rng(1).standard_normal((20, 2))[:, [0, 1, 1]]
+    found, unseen = _inverse(rows)
+    assert unseen.tolist() == [False, True, True]
+    np.testing.assert_allclose(found, np.linalg.pinv(rows.T @ rows), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(("slip", "unknown"), [(0.5, ""), (30.0, "no effect")])
@@ -100,7 +101,8 @@ def test_the_slip_of_a_slider_that_never_slips_has_no_effect_on_the_data(slip, u
     data, parameters = experiment(true, noise=1e-3), Parameters(true, (0,), False)
     test = ModalTest(parameters, linear_modes(true, 1), linear)
     vector = parameters.vector(true)
-    covariance, _, unseen = Problem(parameters, [data], [None], test, 0.01).uncertainty(vector)
+    problem = Problem(parameters, [data], [None], test, 0.01, FitWatch(None, 1, 1))
+    covariance, _, unseen = problem.uncertainty(vector)
     named = [name for name, one in zip(parameters.names, unseen, strict=True) if one]
     found = {one.name: one.unknown for one in fitted_numbers(parameters, vector, covariance, named)}
     assert found["element 1 jenkins slip"] == unknown
