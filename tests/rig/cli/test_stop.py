@@ -212,7 +212,9 @@ def on_a_terminal(*arguments):
 
 def test_a_run_on_a_terminal_says_how_to_watch_and_stop_it(command):
     _, shown = on_a_terminal("run", "magnet-beam/backbone-short", "-o", "run.h5")
-    lines = [line for line in shown.splitlines() if " s] " not in line]  # slow on a busy machine, it says what it does
+    lines = [
+        line for line in shown.splitlines() if line and " s] " not in line
+    ]  # on a busy machine it says what it does
     assert lines[0] == "in another terminal, `rig watch` shows this run and `rig stop` ramps it down"
     assert "rig watch" not in command("run magnet-beam/backbone-short -o again.h5").err
 
