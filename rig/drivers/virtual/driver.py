@@ -186,12 +186,20 @@ class VirtualDAQ(DAQ):
 
     def _images(self) -> list[str]:
         """What the images of the held output do, where no filter keeps them out of the readings."""
-        if self.rig.converter.anti_alias_hz:
+        converter, modes = self.rig.converter, self.rig.linear_modes
+        names = {channel.role: channel.name for channel in reversed(self.channels)}
+        mode = modes.nearest(self._specimen.linear_frequency_hz)
+        sampled = modes.frequency_hz[mode] < 0.5 * self.sample_rate_hz and modes.damping_ratio[mode] > 0.0
+        if (
+            converter.anti_alias_hz
+            or converter.reconstruction_hz
+            or not sampled
+            or not {"force", "drive"} <= names.keys()
+        ):
             return []
         from simulators.analysis import image_bias  # a rig with filters is opened without it
 
         cure = "the virtual device has no anti-alias filter (driver.options.converter: oversampling, anti_alias_hz)"
-        names = {channel.role: channel.name for channel in reversed(self.channels)}
         bias = image_bias(self.rig, self._specimen.linear_frequency_hz, force=names["force"], drive=names["drive"])
         if abs(bias.damping) > IMAGE_TOLERANCE:
             return [

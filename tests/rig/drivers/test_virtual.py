@@ -62,6 +62,11 @@ def test_slow_bench_without_filters_and_with_little_bias_still_says_that_the_out
     assert "anti_alias_hz" in remark
 
 
+def test_a_reconstruction_filter_keeps_the_images_from_the_structure() -> None:
+    filtered = SLOW_AND_FILTERED | {"anti_alias_hz": 0.0, "reconstruction_hz": 320.0}
+    assert not [remark for remark in make_daq(slow_bench(**filtered)).remarks if "images" in remark]
+
+
 def test_slow_bench_with_filters_gives_no_remark() -> None:
     assert make_daq(slow_bench(**SLOW_AND_FILTERED)).remarks == ()
 
