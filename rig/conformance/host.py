@@ -34,6 +34,17 @@ class HostWatch:
         waited_s = _waited_s() - before[-1] if before else 0.0
         return max(FACTOR * max(near_s, default=0.0), waited_s if waited_s > LATE_S else 0.0)
 
+    @staticmethod
+    def stalls_alone(limit_s: float, for_s: float) -> bool:
+        """Whether this machine keeps a thread that uses no device waiting for longer than a limit, within some seconds."""
+        end_s = (before_s := time.perf_counter()) + for_s
+        while before_s < end_s:
+            now_s = time.perf_counter()
+            if now_s - before_s > limit_s:
+                return True
+            before_s = now_s
+        return False
+
     def _nap(self) -> None:
         while not self._over.is_set():
             began = time.perf_counter()

@@ -48,6 +48,19 @@ def test_a_thread_that_keeps_the_interpreter_makes_the_host_late():
         assert watch.late_s(began, began + 60.0) > 0.0
 
 
+def test_a_machine_that_stalls_without_a_device_is_found(monkeypatch):
+    times = iter([0.0, 0.001, 0.002, 0.04, 0.041])
+    monkeypatch.setattr(host.time, "perf_counter", lambda: next(times))
+    assert HostWatch.stalls_alone(0.025, 1.0)
+
+
+def test_a_machine_that_does_not_stall_is_watched_for_as_long_as_asked(monkeypatch):
+    times = iter([0.01 * k for k in range(102)])
+    monkeypatch.setattr(host.time, "perf_counter", lambda: next(times))
+    assert not HostWatch.stalls_alone(0.025, 1.0)
+    assert next(times) > 1.0
+
+
 def test_the_last_output_of_a_log_has_no_sign(tmp_path):
     log = tmp_path / "log"
     log.write_text("0.1 5 0.02\n0.2 6 -0.05\n")

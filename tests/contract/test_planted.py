@@ -8,7 +8,7 @@ from rig.drivers.virtual import VirtualDAQ
 from tests.contract.planted import PLANTED
 from tests.contract.planted.continuing import ContinuingDAQ
 from tests.contract.planted.drivers import GOOD, CloseUnseen, LateHost, PacedDAQ, StopUnseen
-from tests.contract.planted.hosts import Late, Punctual
+from tests.contract.planted.hosts import Late, LateUnseen, Punctual
 from tests.contract.planted.table import BEGIN, written
 from tests.docs.pages import ROOT
 from tests.refused import refused
@@ -115,10 +115,11 @@ def test_an_honest_clock_is_never_failed_on_a_host_that_is_late(test):
     assert objection_or_doubt(OverADriver(LateHost, Late), test) in ("", "unproven")
 
 
-def test_a_stall_of_a_host_that_was_late_is_not_held_against_the_driver():
+@pytest.mark.parametrize("host", [Late, LateUnseen])
+def test_a_stall_of_a_host_that_was_late_is_not_held_against_the_driver(host):
     stalls = next(fault for fault in PLANTED if fault.driver.__name__ == "StallsFor50Ms")
     with refused(Unproven, "this-machine-was-too-busy"):
-        objection(OverADriver(stalls.driver, Late), stalls.test)
+        objection(OverADriver(stalls.driver, host), stalls.test)
 
 
 def test_a_clock_that_is_off_is_found_on_a_host_that_is_often_late():

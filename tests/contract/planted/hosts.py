@@ -15,8 +15,18 @@ class Punctual:
     def late_s(self, began_s, ended_s):
         return self.late
 
+    def stalls_alone(self, limit_s, for_s):
+        return self.late > limit_s
+
 
 class Late(Punctual):
     """A host that is always late, by up to half a second."""
 
     late = 0.5
+
+
+class LateUnseen(Punctual):
+    """A host that is late without its naps showing it."""
+
+    def stalls_alone(self, limit_s, for_s):
+        return True
