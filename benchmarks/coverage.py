@@ -98,7 +98,7 @@ def continuous(exact: VirtualRig) -> tuple[VirtualRig, int]:
         raise ValueError(
             f"reconstruction_hz = {converter.reconstruction_hz:g}: allowed is 0, a replay holds the output"
         )
-    finer = converter.substeps * -(-FINER // converter.substeps)
+    finer = exact.substeps * -(-FINER // exact.substeps)
     changes = {
         "sample_rate_hz": finer * converter.sample_rate_hz,
         "substeps": 1,

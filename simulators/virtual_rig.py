@@ -12,7 +12,7 @@ from simulators.exciter import Exciter, Stinger
 from simulators.layout import RigArrays, RigState
 from simulators.modes import LinearModes, coupled_modes, structure_modes
 from simulators.part import Part, Several
-from simulators.plant.assembly import LinearPlant, assemble, check_elements, check_plant, check_step, computable
+from simulators.plant.assembly import LinearPlant, assemble, check_elements, check_plant, computable, steps_per_sample
 from simulators.plant.compilation import at_rest, rediscretised, rig_arrays
 from simulators.scatter import Deviation, Scatter, deviated
 from simulators.sensing.filters import channel_delays, filter_delay
@@ -90,7 +90,7 @@ class VirtualRig(Part):
             check_elements(self.elements, self.plant)
             check_plant(self.plant)
             self._check_joints(self.plant)
-            check_step(self.elements, self.plant, self.converter.sample_rate_hz, self.converter.substeps)
+            _ = self.substeps
             self._check_wear()
         self._check_low_passes()
         return self
@@ -156,6 +156,7 @@ class VirtualRig(Part):
             [self.output_row(sensor) for sensor in self.sensors],
             self.sensors,
             self.converter,
+            substeps=self.substeps,
             noise_scale=self.noise_scale,
             seed=self.seed if seed is None else seed,
         )
@@ -231,7 +232,7 @@ class VirtualRig(Part):
             return arrays
         plant = self._worn_plant(time_s)
         outputs = [self._row(plant, sensor) for sensor in self.sensors]
-        return rediscretised(arrays, plant, len(self.friction), outputs, self.converter)
+        return rediscretised(arrays, plant, len(self.friction), outputs, 1.0 / (rate_hz * self.substeps))
 
     def _worn_deviation(self, time_s: float) -> Deviation:
         worn = self.wear.deviation(time_s, self._nominal_plant.n_mode, self.deviation)
@@ -258,6 +259,11 @@ class VirtualRig(Part):
     def channel_names(self) -> tuple[str, ...]:
         """Names of the channels, in the order of ``out_v``."""
         return tuple(sensor.name for sensor in self.sensors)
+
+    @cached_property
+    def substeps(self) -> int:
+        """Integration steps per sample: those of the converter, with ``"auto"`` the fewest that all elements allow."""
+        return steps_per_sample(self.elements, self.plant, self.converter)
 
     @property
     def sensitivities_v_per_unit(self) -> NDArray[np.float64]:

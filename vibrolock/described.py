@@ -7,7 +7,9 @@ from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
-from pydantic import BaseModel, GetJsonSchemaHandler
+from pydantic import BaseModel, GetJsonSchemaHandler, ValidationError, ValidatorFunctionWrapHandler, WrapValidator
+
+from vibrolock.errors import InputError
 
 
 class Described(BaseModel):
@@ -27,6 +29,18 @@ class Described(BaseModel):
                 if name in fields:
                     fields[name].setdefault("description", text)
         return made
+
+
+def one_fault(allowed: str) -> WrapValidator:
+    """Let a field that is a number or a word have one fault that says what is allowed; a union has one of each kind."""
+
+    def validated(value: object, validate: ValidatorFunctionWrapHandler) -> object:
+        try:
+            return validate(value)
+        except ValidationError:
+            raise InputError("is None" if value is None else "", value=value, allowed=allowed) from None
+
+    return WrapValidator(validated)
 
 
 @cache

@@ -14,6 +14,7 @@ import numpy as np
 
 from simulators.exciter import Exciter, Stinger
 from simulators.plant.sites import Place, element_places, exciter_places
+from simulators.sensing.parts import MOST_SUBSTEPS, Converter
 from simulators.sites.elements import Clearance, Element, Magnet
 from simulators.sites.friction import FrictionSite
 from simulators.structures.structure import Structure
@@ -206,24 +207,37 @@ def check_plant(plant: LinearPlant) -> None:
         )
 
 
-def check_step(elements: Sequence[Element], plant: LinearPlant, rate_hz: float, substeps: int) -> None:
-    """Raise `ValueError`, naming a sufficient step, if the slope of an element is too steep for the integration step.
+def steps_per_sample(elements: Sequence[Element], plant: LinearPlant, converter: Converter) -> int:
+    """Return the integration steps per sample: those written, with ``"auto"`` the fewest that the elements allow.
 
+    Raises `ValueError`, naming a sufficient step, if the slope of an element is too steep for those written.
     Only the linear plant is integrated exactly. The force of an element is integrated by a second-order predictor-corrector,
     whose step h must resolve ``w_e^2 = k_e sum_i row_i^2``, or the rate ``c_e sum_i row_i^2`` of an element of velocity.
     """
+    mobilities = [float(row @ row) for row in plant.site_rows[: len(elements)]]
+    needed = [
+        math.ceil(_rate(element, mobility) / (converter.sample_rate_hz * LARGEST_STEP))
+        for element, mobility in zip(elements, mobilities, strict=True)
+    ]
+    substeps = converter.substeps_from(max(needed, default=0))
     for i, element in enumerate(elements):
-        mobility = float(plant.site_rows[i] @ plant.site_rows[i])
-        of_velocity = element.moves_with == "velocity"
-        rate = element.steepest_n_m * mobility
-        rate = rate if of_velocity else math.sqrt(rate)
-        if rate / (rate_hz * substeps) > LARGEST_STEP:
-            needed = math.ceil(rate / (rate_hz * LARGEST_STEP))
-            largest = LARGEST_STEP * rate_hz * substeps
-            allowed = (largest if of_velocity else largest**2) / mobility
+        if needed[i] > substeps:
+            largest = LARGEST_STEP * converter.sample_rate_hz * substeps
+            of_velocity = element.moves_with == "velocity"
+            allowed = (largest if of_velocity else largest**2) / mobilities[i]
+            finer = (
+                f"converter.substeps of at least {needed[i]}" if needed[i] <= MOST_SUBSTEPS else "a higher sample rate"
+            )
             raise InputError(
                 f"its slope of {element.steepest_n_m:.6g} {('N s/m' if of_velocity else 'N/m')} at "
                 f"{element.at!r} is too steep for {substeps} integration steps per sample",
                 field=f"elements[{i}]",
-                allowed=f"up to {allowed:.6g}, or converter.substeps of at least {needed}",
+                allowed=f"up to {allowed:.6g}, or {finer}",
             )
+    return substeps
+
+
+def _rate(element: Element, mobility: float) -> float:
+    """Return the angular frequency (or rate, of an element of velocity) of an element on the structure's modes, 1/s."""
+    slope = element.steepest_n_m * mobility
+    return slope if element.moves_with == "velocity" else math.sqrt(slope)

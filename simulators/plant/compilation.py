@@ -115,14 +115,18 @@ def rig_arrays(
     sensors: Sequence[Sensor],
     converter: Converter,
     *,
+    substeps: int,
     noise_scale: float,
     seed: int,
 ) -> RigArrays:
-    """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
-    predictor, corrector = step_columns(plant, len(joints), converter.step_s)
+    """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor.
+
+    ``substeps``: integration steps per sample.
+    """
+    predictor, corrector = step_columns(plant, len(joints), 1.0 / (converter.sample_rate_hz * substeps))
     jenkins = jenkins_elements(joints)
-    substeps = converter.substeps // converter.oversampling
-    sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
+    per_instant = substeps // converter.oversampling
+    sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), per_instant, exciter.input_limit_v)
     delays, taps = skew_taps(sensors, converter)
     noise_v = [
         math.hypot(noise_scale * one.noise_rms * one.sensitivity_v_per_unit, converter.adc_noise_v) for one in sensors
@@ -151,10 +155,13 @@ def rig_arrays(
 
 
 def rediscretised(
-    rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Float], converter: Converter
+    rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Float], step_s: float
 ) -> RigArrays:
-    """Return a rig's arrays for another plant with the same coordinates and sites; ``outputs``: one row per sensor."""
-    predictor, corrector = step_columns(plant, n_joint, converter.step_s)
+    """Return a rig's arrays for another plant with the same coordinates and sites; ``outputs``: one row per sensor.
+
+    ``step_s``: integration step.
+    """
+    predictor, corrector = step_columns(plant, n_joint, step_s)
     return rig._replace(step=predictor, correct=corrector, sense=pad(np.array(outputs).T))
 
 

@@ -7,6 +7,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from simulators.part import NotNegative, Part, Positive
 from vibrolock.data_sheet import volts_per_unit
+from vibrolock.described import one_fault
 from vibrolock.errors import InputError
 
 TAPS = 6
@@ -15,6 +16,9 @@ LOWEST_INTERNAL_RATE_HZ = 4000.0
 """Lowest internal rate for an anti-alias or reconstruction filter; below, the held output's stairs alias into the readings."""
 LOWEST_CORNER = 0.001
 """Lowest corner of a converter's filter over the sample rate; such a filter delays by about six hundred samples."""
+
+FEWEST_SUBSTEPS, MOST_SUBSTEPS = 2, 1024
+"""Integration steps per sample: the fewest of ``"auto"``, and the most that can be written."""
 
 Bits = Annotated[int, Field(ge=0, le=32)]
 Order = Annotated[int, Field(ge=1, le=8)]
@@ -95,8 +99,11 @@ class Converter(Part):
 
     sample_rate_hz: Annotated[float, Field(ge=100.0, le=1e6)] = 5000.0
     """Samples per second."""
-    substeps: Annotated[int, Field(ge=1, le=1024)] = 2
-    """Integration steps per sample; a multiple of ``oversampling``."""
+    substeps: Annotated[
+        Annotated[int, Field(ge=1, le=MOST_SUBSTEPS)] | Literal["auto"], one_fault(f"1 to {MOST_SUBSTEPS}, or 'auto'")
+    ] = "auto"
+    """Integration steps per sample; a multiple of ``oversampling``. ``"auto"``: the fewest that the stiffest element allows,
+    two or more."""
     oversampling: Annotated[int, Field(ge=1, le=256)] = 1
     """Internal steps per sample, at which sensors and filters run."""
     anti_alias_hz: NotNegative = 0.0
@@ -123,7 +130,7 @@ class Converter(Part):
 
     @model_validator(mode="after")
     def _fits(self) -> "Converter":
-        if self.substeps % self.oversampling:
+        if self.substeps != "auto" and self.substeps % self.oversampling:
             raise InputError(
                 field="substeps", value=self.substeps, allowed=f"a multiple of oversampling = {self.oversampling}"
             )
@@ -157,10 +164,12 @@ class Converter(Part):
         """Rate of sensors and filters."""
         return self.sample_rate_hz * self.oversampling
 
-    @property
-    def step_s(self) -> float:
-        """Integration step."""
-        return 1.0 / (self.sample_rate_hz * self.substeps)
+    def substeps_from(self, fewest: int) -> int:
+        """Return the integration steps per sample: those written, else the fewest allowed of which ``fewest`` are enough."""
+        if self.substeps != "auto":
+            return self.substeps
+        per_instant = max(1, math.ceil(max(fewest, FEWEST_SUBSTEPS) / self.oversampling))
+        return self.oversampling * min(per_instant, MOST_SUBSTEPS // self.oversampling)
 
     @property
     def adc_step_v(self) -> float:

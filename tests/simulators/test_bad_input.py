@@ -4,6 +4,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from simulators.sensing.parts import Converter
 from simulators.virtual_rig import VirtualRig
 from tests.refused import refused
 
@@ -33,7 +34,13 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"specimen": "magnet-beam", "exciter": {"armature_mass_kg": "0.2"}},
         {"field": "exciter.armature_mass_kg", "value": "0.2"},
     ),
-    ({"specimen": "magnet-beam", "converter": {"substeps": 0}}, {"field": "converter.substeps", "value": 0}),
+    *(
+        (
+            {"specimen": "magnet-beam", "converter": {"substeps": substeps}},
+            {"where": "converter.substeps", "value": substeps, "allowed": "1 to 1024, or 'auto'"},
+        )
+        for substeps in (0, 2.5, "soon")
+    ),
     (
         {"specimen": "magnet-beam", "converter": {"sample_rate_hz": float("nan")}},
         {"says": "finite-number", "field": "converter.sample_rate_hz"},
@@ -139,6 +146,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
         {"field": "elements[0]", "allowed": "up to 1.66258e+07, or converter.substeps of at least 10"},
     ),
     (
+        table(elements=[STOP | {"contact_stiffness_n_m": 1e13}], converter={"substeps": "auto", "oversampling": 5}),
+        {"field": "elements[0]", "allowed": "up to 1.08109e+12, or a higher sample rate"},  # 1.66258e+07 (1020/4)^2
+    ),
+    (
         table(elements=[{"kind": "cubic", "at": "magnet", "stiffness_n_m3": 1e9, "linear_n_m": -1e5}]),
         {"field": "elements", "allowed": "no more than the structure has there"},
     ),
@@ -188,6 +199,30 @@ def test_every_field_is_described() -> None:
 def test_a_step_that_is_called_long_enough_is_accepted() -> None:
     stiff = table(elements=[STOP | {"contact_stiffness_n_m": 1e8}], converter={"substeps": 12})
     assert VirtualRig.model_validate(stiff).converter.substeps == 12  # 10 or more, a multiple of the internal instants
+
+
+@pytest.mark.parametrize(
+    ("stiffness_n_m", "oversampling", "expected"),
+    [(1e4, 1, 2), (1e4, 3, 3), (1e8, 1, 10), (1e8, 4, 12)],  # ten are needed for 1e8 N/m, see above
+)
+def test_auto_takes_the_fewest_steps_that_the_stiffest_stop_allows(
+    stiffness_n_m: float, oversampling: int, expected: int
+) -> None:
+    stops = [STOP, STOP | {"contact_stiffness_n_m": stiffness_n_m}]
+    converter = {"substeps": "auto", "oversampling": oversampling, "anti_alias_hz": 0.0}
+    rig = VirtualRig.model_validate(table(elements=stops, converter=converter))
+    assert (rig.substeps, rig.converter.substeps) == (expected, "auto")
+    assert rig.build()[0].plant["substeps"][0] * oversampling == expected
+    if stiffness_n_m > 1e4:
+        with refused(ValidationError, field="elements[1]"):
+            VirtualRig.model_validate(
+                table(elements=stops, converter=converter | {"substeps": expected - oversampling})
+            )
+
+
+def test_steps_that_are_written_are_kept() -> None:
+    assert Converter().substeps == "auto"
+    assert VirtualRig.model_validate(table(converter={"substeps": 64})).substeps == 64
 
 
 def test_a_stop_behind_a_one_sided_magnet_is_no_matter() -> None:

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
 from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.drivers.wire.facts import DeviceFacts
 from rig.errors import DaqRefused
+from vibrolock.described import one_fault
 
 LARGEST_QUEUE = 64  # blocks; of the protocol (docs/reference/wire-protocol.md)
 MOST_S = 4000.0  # microseconds in an unsigned word of four bytes
@@ -18,7 +18,10 @@ MOST_S = 4000.0  # microseconds in an unsigned word of four bytes
 class WireOptions(Configured):
     """Options that all wires share; each driver adds those that locate the device."""
 
-    queue_blocks: Annotated[int, Field(ge=1, le=LARGEST_QUEUE)] | Literal["auto"] = "auto"
+    queue_blocks: Annotated[
+        Annotated[int, Field(ge=1, le=LARGEST_QUEUE)] | Literal["auto"],
+        one_fault(f"1 to {LARGEST_QUEUE} blocks, or 'auto'"),
+    ] = "auto"
     """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop.
     ``"auto"``: before a run, at 0 V, lateness is measured for a second and a half, and the shortest queue taken that covers it;
     without a closed loop one of up to 0.1 s; 1 where the device waits for the host."""
@@ -29,15 +32,6 @@ class WireOptions(Configured):
     """Duration of the ramp to 0 V after the watchdog has tripped, s; 0 drops the output at once."""
     timeout_s: float | None = Field(None, gt=0, le=MOST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
-
-    @field_validator("queue_blocks", mode="wrap")
-    @classmethod
-    def _number_or_auto(cls, value: object, validate: ValidatorFunctionWrapHandler) -> object:
-        try:
-            return validate(value)
-        except ValidationError:  # one of each kind, which would be two faults of one key
-            allowed = f"1 to {LARGEST_QUEUE} blocks, or 'auto'"
-            raise PydanticCustomError("allowed", "{allowed}", {"allowed": allowed}) from None
 
     @property
     def queue(self) -> int:
