@@ -179,7 +179,7 @@ def test_a_backbone_of_four_levels_has_a_sinusoidal_force(changes, most):
 def test_the_loop_suits_a_held_force_and_a_held_response():
     for name, levels in (
         ("magnet-beam/stepped-phase-fast", {"levels_n": (0.55,)}),
-        ("magnet-beam/stepped-phase-fast-rms", {}),
+        ("magnet-beam/stepped-phase", {}),
     ):
         plan = changed(name, harmonics={}, start_deg=-120.0, stop_deg=-60.0, step_deg=30.0, **levels)
         with rig.run(plan, seed=4) as run:

@@ -26,14 +26,14 @@ def _shortened(name, level, lags):
     ("name", "level", "amplitude"),
     [
         ("magnet-beam/stepped-phase-fast", 0.55, 1e-3),
-        ("magnet-beam/stepped-phase-fast-rms", 0.388909, 1e-3),
+        ("magnet-beam/stepped-phase", 0.388909, 1e-3),
         ("friction-beam/stepped-phase-fast", 15.0, 3e-3),
-        ("friction-beam/stepped-phase-fast-rms", 3.53553, 3e-3),
+        ("friction-beam/stepped-phase", 3.53553, 3e-3),
     ],
 )
 def test_every_point_lies_on_the_curve_of_harmonic_balance(name, level, amplitude):
     lags = [-150.0, -120.0, -90.0, -80.0, -60.0, -50.0]
-    truth = _truth(name.split("/")[0], level, lags, name.endswith("rms"))
+    truth = _truth(name.split("/")[0], level, lags, "fast" not in name)
     with rig.run(_shortened(name, level, lags), seed=11) as run:
         assert run.complete, [point["reason"] for point in run.recording.points]
         points = list(run.recording.latest.values())
@@ -64,7 +64,7 @@ def test_a_test_goes_on_along_its_branch_after_a_change_of_plan(tmp_path):
 
 @pytest.mark.slow
 def test_a_force_that_is_mostly_another_mode_is_no_point():
-    plan = load_plan("friction-beam/stepped-phase").model_copy(update={"levels_rms_n": (1.41421,)})
+    plan = load_plan("friction-beam/stepped-phase-paper").model_copy(update={"levels_rms_n": (1.41421,)})
     with rig.run(plan, seed=0) as run:
         points = list(run.recording.latest.values())
     truth = _truth("friction-beam", 1.41421, [-30.0], rms=True)

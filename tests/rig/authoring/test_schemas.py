@@ -224,7 +224,7 @@ BROKEN_PLANS = {
         ("controller.detector", "three-phase"), ("controller.frequency_window_hz", [22.0]), ("controller.k1", -1.0),
         ("controller.lock.lost", 1), ("settle.phase_deg", 46), ("settle.amplitude", 0.0), ("telemetry_s", 61), ("rows", "some"),
     ],
-    "magnet-beam/stepped-phase": [("phase_lags_deg", []), ("step_deg", 0.0), ("on_failure", "retry")],
+    "magnet-beam/stepped-phase-paper": [("phase_lags_deg", []), ("step_deg", 0.0), ("on_failure", "retry")],
     "magnet-beam/response-controlled": [("levels_m", None), ("phase_lags_deg", None)],
     "magnet-beam/continuous-backbone": [("sweep_periods", None), ("sweep_periods", 5), ("margin", 2.0)],
     "magnet-beam/sweep-1": [("start_hz", 0.0), ("rate_octaves_per_min", 1.0), ("stop_hz", None)],

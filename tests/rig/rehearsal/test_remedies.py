@@ -72,7 +72,7 @@ def test_a_good_plan_stays_as_it_is():
     "name",
     [
         "magnet-beam/backbone",
-        "magnet-beam/stepped-phase",
+        "magnet-beam/stepped-phase-paper",
         "magnet-beam/sweep-1",
         "magnet-beam/multisine-1",
         "friction-beam/dwell",

@@ -134,7 +134,7 @@ def test_five_lags_of_the_friction_beam_give_its_mode_as_harmonic_balance_has_it
 
 
 def test_a_held_rms_gives_responses_and_not_a_mode(command, tmp_path):
-    shipped = load_plan("magnet-beam/stepped-phase-fast-rms").model_dump(exclude_none=True)
+    shipped = load_plan("magnet-beam/stepped-phase").model_dump(exclude_none=True)
     shipped = {name: value for name, value in shipped.items() if name not in ("start_deg", "stop_deg", "step_deg")}
     plan = plan_from(shipped | {"levels_rms_n": [0.1], "phase_lags_deg": [-110.0, -90.0, -70.0]}, "three lags")
     with rig.run(plan, output=tmp_path / "lags.h5", seed=1) as run:

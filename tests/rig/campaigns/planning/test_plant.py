@@ -113,10 +113,10 @@ def test_a_phase_that_a_force_loop_cannot_hold_is_refused_with_its_lag_and_the_o
 
 
 def test_the_phases_that_the_papers_force_loop_loses_on_the_friction_beam_are_refused():
-    plan, bench = phases_for("stepped-phase", [-150.0, -140.0, -130.0, -100.0, -60.0, -30.0])
+    plan, bench = phases_for("stepped-phase-paper", [-150.0, -140.0, -130.0, -100.0, -60.0, -30.0])
     with refused(ConfigurationError, "at-lag-of-deg", field="controller"):
         plan.check(bench)
-    plan, bench = phases_for("stepped-phase", [-100.0, -60.0, -30.0])
+    plan, bench = phases_for("stepped-phase-paper", [-100.0, -60.0, -30.0])
     plan.check(bench)
 
 
@@ -138,8 +138,8 @@ def test_the_loop_of_a_held_response_is_checked_at_every_lag():
 @pytest.mark.parametrize(("k2", "k4"), [(6280.0, 1.0), (6280.0, 500.0), (6.28, 500.0 * 1.5)])
 def test_the_papers_gains_a_hundred_times_as_large_are_refused_on_the_magnet_beam(k2, k4):
     lags = [-150.0, -90.0, -30.0]
-    phases_for("stepped-phase", lags, name="magnet-beam")[0].check(load_bench("magnet-beam"))
-    plan, bench = phases_for("stepped-phase", lags, name="magnet-beam", controller={"k2": k2, "k4": k4})
+    phases_for("stepped-phase-paper", lags, name="magnet-beam")[0].check(load_bench("magnet-beam"))
+    plan, bench = phases_for("stepped-phase-paper", lags, name="magnet-beam", controller={"k2": k2, "k4": k4})
     with refused(ConfigurationError, "unstable-is-too-quick-on-the", field="controller"):
         plan.check(bench)
 
@@ -153,7 +153,7 @@ def test_a_loop_that_is_too_quick_is_refused_with_its_gain_at_half_the_frequency
 @pytest.mark.parametrize("name", LINEAR_HZ)
 @pytest.mark.parametrize(
     "kind",
-    ["stepped-phase-fast", "stepped-phase-fast-rms", "response-controlled", "backbone-short", "continuous-backbone"],
+    ["stepped-phase-fast", "stepped-phase", "response-controlled", "backbone-short", "continuous-backbone"],
 )
 def test_shipped_plans_pass_with_their_plant(name, kind):
     table = load_plan(f"{name}/{kind}").model_dump(mode="json", exclude_none=True)

@@ -119,7 +119,7 @@ def test_levels_beyond_the_bench_are_refused():
         plan(controller=window).check(bench)
 
 
-@pytest.mark.parametrize("name", [name for name in shipped_plans() if name.endswith("/stepped-phase")])
+@pytest.mark.parametrize("name", [name for name in shipped_plans() if name.endswith("/stepped-phase-paper")])
 def test_the_plan_of_the_paper_holds_its_gains_and_levels(name):
     shipped = load_plan(name)
     specimen = name.split("/")[0]
