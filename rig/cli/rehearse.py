@@ -64,7 +64,8 @@ def rehearse_(
         seed=seed,
     )
     if output is None:
-        raise typer.BadParameter("a file is expected", param_hint="--output")
+        wanted = "bench, such as -o twin.toml" if twin is not None else "rehearsal, such as -o rehearsal.h5"
+        raise typer.BadParameter(f"missing: the file of the {wanted}", param_hint="--output")
     if twin is not None:
         _write_twin(subject, twin, output, overwrite)
         return

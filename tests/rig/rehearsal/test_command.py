@@ -79,7 +79,7 @@ def test_what_it_refuses_is_one_line_and_leaves_no_file(command, folder, argumen
 def test_without_an_output_it_is_wrong_use(command):
     told = command("rehearse plan.toml --exact")
     assert told.status == 2
-    assert "--output: a file is expected" in told.err
+    assert "--output: missing: the file of the rehearsal, such as -o rehearsal.h5" in told.err
 
 
 def test_an_existing_file_stays_without_overwrite(command):

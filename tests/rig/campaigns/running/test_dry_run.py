@@ -70,7 +70,7 @@ def test_a_dry_run_writes_nothing_and_a_run_wants_a_file(command, place, monkeyp
     assert not (place / "run.h5").exists()
     status, out, err = command("run magnet-beam/backbone")
     assert (status, out) == (2, "")
-    assert "--output: a file is needed, or --dry-run" in err
+    assert "--output: missing: the file of the recording, such as -o run.h5, or --dry-run" in err
 
 
 def test_how_long_a_run_takes_is_that_of_its_sweep_and_faster_on_a_virtual_rig():
