@@ -49,7 +49,9 @@ def run(
 
     loaded, chosen = plan_and_bench(plan, bench)
     if output is None and not dry_run:
-        raise typer.BadParameter("missing: the file of the recording, such as -o run.h5, or --dry-run", param_hint="--output")
+        raise typer.BadParameter(
+            "missing: the file of the recording, such as -o run.h5, or --dry-run", param_hint="--output"
+        )
     if daq is not None:
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
     if output is None or dry_run:

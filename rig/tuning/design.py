@@ -29,7 +29,7 @@ from controller.tuning import (
     unstable_poles,
 )
 from identification import FrequencyResponseMatrix
-from rig.tuning.plant import TuningError, largest_outside
+from rig.tuning.plant import UnsuitedError, largest_outside
 
 LawName = Literal["frequency-error", "phase"]
 DAMPINGS = (1.0, 2.0, 4.0)  # damping at higher levels, as multiples of the damping in the linear test
@@ -100,7 +100,7 @@ def choose(
 ) -> Chosen:
     """Choose the gains for a plant; ``noise`` says in words what bounds the low-pass.
 
-    Raises `TuningError`, with the numbers, if no gains are suitable.
+    Raises `UnsuitedError`, with the numbers, if no gains are suitable.
     """
     omega = plant.lock_frequency_rad_s()
     allowed = [w for w in (omega / part for part in LOW_PASSES) if w <= 1.001 * largest_low_pass_rad_s]
@@ -191,7 +191,7 @@ def _suits(loop: ControlLoop, plant: PlantModel, responses: FrequencyResponseMat
     return all(peak <= bound for peak, bound in zip(peaks, bounds, strict=True)) and assess(loop).suited
 
 
-def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, tried: int) -> TuningError:
+def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, tried: int) -> UnsuitedError:
     """Return the error for a plant that no gains suit, with the reasons for the slowest."""
     loop = ControlLoop(
         plant,
@@ -201,7 +201,7 @@ def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, t
     )
     slowest, beyond = assess(loop), _beyond(loop, responses)
     reasons = "; ".join(slowest.reasons) or f"max |S| above {MAX_SENSITIVITY:g}"
-    return TuningError(
+    return UnsuitedError(
         f"this rig is unsuited to complex response control with a frequency-error loop: {reasons} ({tried} sets of gains "
         f"tried; the slowest, w_LP = w0/{loop.omega_rad_s / w:.3g}, has max |S| {_quick_peak(loop):.2f} and a gain of "
         f"{beyond[0]:.2f} at {beyond[1]:.4g} Hz)"
@@ -212,7 +212,7 @@ def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
     plants = _damped(plant)
     design = design_phase_law(plants, w, sensitivity_peak=MAX_PHASE_SENSITIVITY)
     if not design.suited:
-        raise TuningError(f"this rig is unsuited to a phase-locked loop: {'; '.join(design.reasons)}")
+        raise UnsuitedError(f"this rig is unsuited to a phase-locked loop: {'; '.join(design.reasons)}")
     measured = replace(assess(replace(design.loop, plant=plant)), failed=design.failed, notes=design.notes)
     return Chosen(
         law="phase",

@@ -33,6 +33,8 @@ MAX_REFINEMENT = 32.0  # most by which the spacing of the lines is reduced after
 GOOD_COHERENCE = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
 MIN_COHERENCE = 0.9  # least coherence of a level chosen by the user, or of the highest that the limits allow
 MAX_CREST_FACTOR = 4.0  # largest expected ratio of peak to RMS of a multisine's response
+MAX_DISTORTION = 0.005  # distortion relative to the linear response of the force
+OTHER = 2.0  # factor between the levels of a test and of a second one; chosen
 SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)  # see `LevelSearch`; chosen
 
 
@@ -58,6 +60,19 @@ class LinearTest:
     """RMS of the force that the last bits of the output converter cause, at frequencies other than the output's, N."""
     levels_tried_v: tuple[float, ...]
     """All levels that were played in the search, V RMS."""
+    share_of_limits: float
+    """Largest peak of output and channels relative to its limit."""
+
+    @property
+    def other_levels_v(self) -> tuple[float, ...]:
+        """Levels for a second test, V RMS: twice this one where limits allow, and half of it where noise does.
+
+        With more than `MAX_DISTORTION` half comes first.
+        """
+        up = OTHER * self.share_of_limits <= SEARCH.safe_share
+        down = 1.0 / (1.0 + OTHER**2 * (1.0 / min(self.coherence) - 1.0)) >= MIN_COHERENCE
+        levels = [OTHER * self.level_rms_v] * up + [self.level_rms_v / OTHER] * down
+        return tuple(sorted(levels, reverse=self.distortion <= MAX_DISTORTION))
 
 
 def measure(
@@ -104,6 +119,7 @@ def measure(
         acceleration_density=noise[1],
         bits_force_n=bits_force_n(bench, matrix, runs.force_beyond_n),
         levels_tried_v=tried,
+        share_of_limits=runs.share_of_limits,
     )
 
 
@@ -131,6 +147,8 @@ class _Runs:
     """RMS of the periodic force above the excited band, N: distortion, and what the output's last bits cause there."""
     coherence: tuple[float, float]
     """Coherence of force and drive at the last coarse level."""
+    share_of_limits: float
+    """Largest peak relative to its limit there."""
 
     def __init__(self, series: MultisineSeries, bench_name: str, highest_hz: float | None) -> None:
         self.series, self.bench, self.name = series, series.bench, bench_name
@@ -170,8 +188,8 @@ class _Runs:
         self.coherence = coherence_of(self.bench, self.measured)
         least = min(self.coherence)
         noise = math.sqrt(max(1.0 / max(least, 1e-9) - 1.0, 0.0) / (1.0 / GOOD_COHERENCE - 1.0))
-        share = share_of_limits(self.bench, self.rows, self._moved_m)
-        return Seen(least >= GOOD_COHERENCE, share, max(1.3 * noise, 1.5))
+        self.share_of_limits = share_of_limits(self.bench, self.rows, self._moved_m)
+        return Seen(least >= GOOD_COHERENCE, self.share_of_limits, max(1.3 * noise, 1.5))
 
     def _moved_m(self, name: str, _: float) -> float:
         amplitude = self.measured.amplitude[self.measured.index(name)]

@@ -21,6 +21,10 @@ class TuningError(RigError):
     """A rig cannot be tuned: its test shows no mode, or no gains are suitable. The message contains the numbers."""
 
 
+class UnsuitedError(TuningError):
+    """No gains suit the plant."""
+
+
 FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
 NARROWER = ((0.7, 1.4), (0.8, 1.25))  # bands of further fits, whose differences show what the model lacks
 MODEL_ERROR = 0.02

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple, get_args
 
 from controller.tuning import PlantModel
 from rig.arming.run_options import RunOptions
@@ -27,15 +27,14 @@ from rig.tuning.levels import (
     needed_n,
     reach_m,
 )
-from rig.tuning.linear_test import LinearTest, measure
+from rig.tuning.linear_test import MAX_DISTORTION, LinearTest, measure
 from rig.tuning.plan import plan_text
-from rig.tuning.plant import channel_ratios, compared_with_bench, plant_of
+from rig.tuning.plant import ChannelRatios, UnsuitedError, channel_ratios, compared_with_bench, plant_of
 from rig.tuning.shifts import frequency_window
 from vibrolock.results import Result
 
 PURPOSE = "tuning"  # purpose of the recording of a tuning, in the facts of its parts
 MIN_NOTED_PHASE_DEG = 5.0  # of a response, from which it is worth a note
-MAX_DISTORTION = 0.005  # distortion relative to the linear response of the force
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,27 +141,15 @@ def tune(
     bench = bench if isinstance(bench, Bench) else load_bench(bench)
     request = request or TuningRequest()
     request.check(bench)
-    test = measure(
-        MultisineSeries(bench, Path(recording), options or RunOptions(), PURPOSE),
-        name,
-        lambda responses, lead: plant_of(bench, responses, lead).damping_ratio,
-        request.level_rms_v,
-        None if request.harmonics is None else band_for(bench, request.harmonics),
-    )
-    plant = plant_of(bench, test.responses, test.lead_samples)
-    measured = channel_ratios(test.responses, plant)
-    notes = [*compared_with_bench(bench, plant), *_turned(measured.turns_deg)]
-    ratios = bench.response_ratios | measured.ratios
-    highest_m = LIMIT_FRACTION * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
-    lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
-    densities = (test.force_density, test.acceleration_density)
-    largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n, needed_n(plant, highest_m))
-    chosen = choose(plant, test.responses, request.law, largest, noise)
+    series = MultisineSeries(bench, Path(recording), options or RunOptions(), PURPOSE)
+    found = _designed(bench, request, name, series)
+    test, plant, measured, chosen = found.test, found.plant, found.measured, found.chosen
+    notes = list(found.notes)
     levels = choose_levels(
         bench,
         plant,
-        ratios,
-        lowest=replace(lowest, force_n=lowest_n),
+        bench.response_ratios | measured.ratios,
+        lowest=found.lowest,
         from_m=request.from_m,
         to_m=request.to_m,
         points=request.points,
@@ -175,7 +162,7 @@ def tune(
             test.responses, test.lead_samples, bench.sample_rate_hz, lock_hz, request.harmonics
         )
     if request.from_m is None:
-        notes += _narrow(bench, levels, lowest)
+        notes += _narrow(bench, levels, found.lowest)
     window, path = frequency_window(bench, test.responses, plant), Path(recording)
     return Tuning(
         bench=bench,
@@ -191,6 +178,68 @@ def tune(
         notes=tuple(notes),
         plan_toml=plan_text(named or name, bench, plant, measured, chosen, levels, window, harmonics, path),
     )
+
+
+class _Designed(NamedTuple):
+    """A plant as measured at one level, and the gains for it."""
+
+    test: LinearTest
+    plant: PlantModel
+    measured: ChannelRatios
+    lowest: LowestForce
+    chosen: Chosen
+    notes: tuple[str, ...]
+
+
+def _designed(bench: Bench, request: TuningRequest, name: str, series: MultisineSeries) -> _Designed:
+    """Measure the plant and choose gains; where none suit it, once more at other levels before the rig is refused.
+
+    Near a zero of the force noise and distortion decide on which side of the imaginary axis the plant's pole comes out.
+    """
+
+    def measured(level_rms_v: float | None) -> LinearTest:
+        return measure(
+            series,
+            name,
+            lambda responses, lead: plant_of(bench, responses, lead).damping_ratio,
+            level_rms_v,
+            None if request.harmonics is None else band_for(bench, request.harmonics),
+        )
+
+    test = measured(request.level_rms_v)
+    try:
+        return _gains(bench, request, test)
+    except UnsuitedError as refusal:
+        others = test.other_levels_v if request.level_rms_v is None else ()
+        for level in others:
+            again = measured(level)
+            try:
+                found = _gains(bench, request, again)
+            except UnsuitedError:
+                continue
+            note = (
+                f"no gains suit the plant as the multisine at {test.level_rms_v:.3g} V RMS shows it; those of this plan are "
+                f"for the plant at {level:.3g} V RMS"
+            )
+            return found._replace(notes=(note, *found.notes))
+        if not others:
+            raise
+        levels = " and ".join(f"{level:.3g}" for level in others)
+        raise UnsuitedError(f"{refusal}; no gains suit the plant at {levels} V RMS either") from refusal
+
+
+def _gains(bench: Bench, request: TuningRequest, test: LinearTest) -> _Designed:
+    """Choose gains for the plant that a test shows."""
+    plant = plant_of(bench, test.responses, test.lead_samples)
+    measured = channel_ratios(test.responses, plant)
+    notes = (*compared_with_bench(bench, plant), *_turned(measured.turns_deg))
+    ratios = bench.response_ratios | measured.ratios
+    highest_m = LIMIT_FRACTION * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
+    lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
+    densities = (test.force_density, test.acceleration_density)
+    largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n, needed_n(plant, highest_m))
+    chosen = choose(plant, test.responses, request.law, largest, noise)
+    return _Designed(test, plant, measured, replace(lowest, force_n=lowest_n), chosen, notes)
 
 
 def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> list[str]:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -17,8 +18,9 @@ from rig.errors import ConfigurationError
 from rig.measurements import spectra
 from rig.recording.reader import Recording
 from rig.tuning import TuningError, TuningRequest, tune
+from rig.tuning.design import choose as choose_gains
 from rig.tuning.figure import draw_on
-from rig.tuning.plant import compared_with_bench
+from rig.tuning.plant import UnsuitedError, compared_with_bench
 from rig.tuning.report import summary
 from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
@@ -172,6 +174,57 @@ def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_sai
     bench = bench_with(name="friction-beam", delay_samples=1000)
     with refused(TuningError, "unsuited-sets-of-gains-tried-max"):
         tune(bench, tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
+
+
+@pytest.mark.parametrize("unsuited", [1, 3])
+def test_a_rig_is_refused_only_after_a_test_at_other_levels(unsuited, monkeypatch, tmp_path):
+    bench, calls = bench_with(name="magnet-beam"), []
+
+    def choose(*arguments):
+        calls.append(arguments)
+        if len(calls) <= unsuited:
+            raise UnsuitedError("the loop is unstable")
+        return choose_gains(*arguments)
+
+    monkeypatch.setattr("rig.tuning.tuning.choose", choose)
+    if unsuited == 3:
+        with refused(TuningError, "no-gains-suit-the-plant-at-either"):
+            tune(bench, tmp_path / "test.h5")
+    else:
+        found = tune(bench, tmp_path / "test.h5")
+        assert any("no gains suit the plant as the multisine at" in note for note in found.notes)
+        assert found.plant.frequency_rad_s / (2 * math.pi) == pytest.approx(24.37, rel=0.01)
+    assert len(calls) == min(unsuited + 1, 3)
+
+
+def test_a_rig_is_refused_at_once_at_a_level_that_was_asked_for(monkeypatch, tmp_path):
+    def choose(*_):
+        raise UnsuitedError("the loop is unstable")
+
+    monkeypatch.setattr("rig.tuning.tuning.choose", choose)
+    with pytest.raises(UnsuitedError, match=r"^the loop is unstable$"):
+        tune(bench_with(name="magnet-beam"), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
+
+
+@pytest.mark.parametrize(
+    ("share", "coherence", "distortion", "levels"),
+    [
+        (0.1, 0.9999, 0.001, (0.04, 0.01)),
+        (0.1, 0.9999, 0.02, (0.01, 0.04)),
+        (0.3, 0.9999, 0.001, (0.01,)),
+        (0.1, 0.95, 0.001, (0.04,)),
+        (0.3, 0.95, 0.001, ()),
+    ],
+)
+def test_other_levels_are_those_that_limits_and_noise_allow(magnet, share, coherence, distortion, levels):
+    test = replace(
+        magnet.test,
+        level_rms_v=0.02,
+        share_of_limits=share,
+        coherence=(coherence, 1.0),
+        distortion=distortion,
+    )
+    assert test.other_levels_v == pytest.approx(levels)
 
 
 def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):

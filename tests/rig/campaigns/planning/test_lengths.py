@@ -49,7 +49,9 @@ def test_more_points_than_anybody_measures_are_refused_at_once_by_key(name, chan
 @pytest.mark.parametrize("step_deg", [1e-3, 1e-9, 1e-30])
 def test_steps_of_a_lag_are_counted_before_they_are_made(step_deg):
     with refused(ConfigurationError, "points", field="step_deg", allowed="up to 10000"):
-        changed("magnet-beam/stepped-phase-paper", phase_lags_deg=None, start_deg=-170.0, stop_deg=-10.0, step_deg=step_deg)
+        changed(
+            "magnet-beam/stepped-phase-paper", phase_lags_deg=None, start_deg=-170.0, stop_deg=-10.0, step_deg=step_deg
+        )
 
 
 @pytest.mark.parametrize(
