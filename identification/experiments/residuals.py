@@ -1,5 +1,7 @@
 """What noise explains of the residual of a model."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -29,6 +31,34 @@ def lacks_something(over_noise: ArrayLike, error: ArrayLike) -> Bool:
     return np.asarray((np.asarray(over_noise) > EXPLAINED) & (np.asarray(error) > SMALL))
 
 
+class ResidualAndNoise(NamedTuple):
+    """Residual and noise of every output in the excited lines of a periodic record; NaN where the noise is unknown."""
+
+    residual: Float
+    """float[n], sums of the squared amplitudes of the residual."""
+    noise: Float
+    """float[n], the same of the noise."""
+    lines: Float
+    """float[n], lines of equal noise whose sum would scatter as much: ``(sum of squares)^2 / sum of fourth powers``."""
+
+
+def log_likelihood_ratio(smaller: ResidualAndNoise, larger: ResidualAndNoise) -> float:
+    """Return by how much the natural logarithm of the likelihood of a larger model exceeds that of a smaller one.
+
+    The noise is that of the smaller model, normal and equal in all lines. Outputs count as if they shared one noise: their
+    mean, which takes too little from independent ones. NaN where the noise is unknown.
+
+    Parameters
+    ----------
+    smaller, larger
+        Residuals of both on the same records, each float[n_records, n_outputs].
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = smaller.lines * (smaller.residual - larger.residual) / smaller.noise
+    known = np.isfinite(found).all(axis=1)
+    return float(np.sum(np.mean(found[known], axis=1))) if known.any() else float("nan")
+
+
 def residual_over_noise(experiment: Experiment, simulated: Float, of_steps: Float | None = None) -> Float:
     """Return the RMS of a model's residual over that of the noise, float[n_outputs], in the excited lines of a periodic record.
 
@@ -49,7 +79,15 @@ def residual_over_noise(experiment: Experiment, simulated: Float, of_steps: Floa
     of_steps
         float[n_outputs, counted], what the steps of the simulation get wrong in them; it counts as noise. None for nothing.
     """
-    unknown = np.full(len(experiment.outputs), np.nan)
+    found = residual_and_noise(experiment, simulated, of_steps)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.sqrt(found.residual / found.noise)
+    return np.where(found.noise > 0.0, ratio, np.nan)
+
+
+def residual_and_noise(experiment: Experiment, simulated: Float, of_steps: Float | None = None) -> ResidualAndNoise:
+    """Return both parts of `residual_over_noise`, of which the arguments are."""
+    unknown = ResidualAndNoise(*np.full((3, len(experiment.outputs)), np.nan))
     covariance, inputs = experiment.noise_covariance, len(experiment.inputs)
     of_steps = np.zeros_like(simulated) if of_steps is None else of_steps
     if covariance is None or not experiment.period_samples or not np.isfinite(simulated + of_steps).all():
@@ -66,10 +104,11 @@ def residual_over_noise(experiment: Experiment, simulated: Float, of_steps: Floa
     weights = np.zeros((int(np.count_nonzero(excited)), len(y), inputs + len(y)), complex)
     weights[:, :, inputs:] = np.eye(len(y))
     weights[:, :, driven[0]] = -(z[:, excited] / u[driven[0], excited]).T
-    power = np.einsum("kij,kjl,kil->i", weights, covariance[excited], weights.conj()).real
-    power += np.sum(np.abs(_lines(of_steps, experiment)[:, excited]) ** 2, axis=1)
-    residual = np.sum(np.abs(z - y)[:, excited] ** 2, axis=1)
-    return np.asarray(np.sqrt(np.divide(residual, power, out=unknown, where=power > 0.0)))
+    power = np.einsum("kij,kjl,kil->ik", weights, covariance[excited], weights.conj()).real
+    power += np.abs(_lines(of_steps, experiment)[:, excited]) ** 2
+    noise, fourth = np.sum(power, axis=1), np.sum(power**2, axis=1)
+    lines = np.divide(noise**2, fourth, out=np.full(len(y), np.nan), where=fourth > 0.0)
+    return ResidualAndNoise(np.sum(np.abs(z - y)[:, excited] ** 2, axis=1), noise, lines)
 
 
 def _lines(values: Float, experiment: Experiment) -> Complex:

@@ -1,22 +1,27 @@
-"""Elements to be fitted, and whether each pays on data to which the model was not fitted."""
+"""Elements to be fitted, how well models with some of them fit, and whether further ones pay."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.experiments.errors import errors_of
 from identification.experiments.experiment import Experiment
+from identification.experiments.residuals import ResidualAndNoise, log_likelihood_ratio, residual_and_noise
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.model import StructuredModel
+from identification.storage import stored
 from identification.validation import convert_fields
 from vibrolock.arrays import Float
 
-_SURE = 0.95
-"""Confidence that errors fall. Chosen."""
-_LEAST_GAIN = 1.05
-"""Smallest factor by which errors have to fall. Chosen."""
+LEAST_GAIN = 1.05
+"""Smallest factor by which errors have to fall for each further element. Chosen."""
+LEAST_LIKELIHOOD = math.log(1.0 / 0.05)
+"""Smallest logarithm of the likelihood ratio: noise alone exceeds it in at most 5 % of cases."""
 
 
 @dataclass(frozen=True)
@@ -45,66 +50,104 @@ class ElementPlan:
                 f"is {', '.join(self.between)}", field="between", allowed="one or two different outputs"
             )
 
+    @property
+    def name(self) -> str:
+        """Kinds of its laws and where it acts, as in ``jenkins@tip:drive``."""
+        return ",".join(law.kind for law in self.laws) + ("@" if self.between else "") + ":".join(self.between)
 
+
+def _upgrade(_arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
+    """Read a trial of an earlier file, which names the last of its elements only."""
+    if "laws" in attributes:
+        between = ":".join(attributes.pop("between"))
+        name = ",".join(attributes.pop("laws"))
+        attributes["elements"] = [f"{name}@{between}" if between else name]
+        attributes.pop("at_least")
+
+
+@stored(upgrade=_upgrade)
 @dataclass(frozen=True, kw_only=True)
 class ElementTrial:
-    """A model with one element more than the one before.
+    """A fitted model with some of the elements, compared with the model that was kept until then.
 
-    Errors of both on every validation experiment are compared in pairs: the logarithm of their ratio has a mean, and a
-    one-sided 95 % limit by Student's t with as many degrees of freedom as experiments less one. An element is kept if errors
-    fall by 5 % or more at that limit; with one experiment, by 5 % or more.
+    Elements are added while they pay. With one element more, errors on the validation data have to fall by 5 % or more, the
+    geometric mean over all experiments; with two more, twice. Both models were fitted to other data, so that a larger number
+    of parameters by itself lowers no error here. If the residual is an error of the model, far above the noise, it is the same
+    in every repetition, and a gain is no chance however few experiments there are: the 5 % decide. If the residual is noise, a
+    gain may be chance. Where the periods show the noise, ``likelihood`` therefore has to be log(20) or more as well. If the
+    smaller model is right as it was fitted, the likelihood ratio on data that neither model was fitted to exceeds 20 in at most
+    5 % of cases, however much data there are and whatever the models (Wasserman, Ramdas and Balakrishnan, Universal inference,
+    PNAS 117, 2020, 16880: the split likelihood ratio).
 
     Parameters
     ----------
-    laws, between
-        Kinds of the element's laws, and outputs where it acts.
+    elements
+        The model's elements, with kinds of laws and places as in ``jenkins@tip:drive``, in its order.
+    compared
+        Elements of the model with which it is compared; empty if with none.
     error
-        RMS of the relative errors on the validation data; NaN without any.
+        RMS of the relative errors on the validation data; NaN without any, inf if the model could not be fitted.
     gain
-        Factor by which errors fell, the geometric mean over experiments; NaN for the first element, or without data.
-    at_least
-        Lower limit of the gain, 95 % sure; NaN where there is none.
+        Factor by which errors are smaller than those of the model with which it is compared; below 1 if they are larger, NaN
+        without that model or without data.
+    likelihood
+        Natural logarithm of the likelihood ratio of the larger of both to the smaller, on the validation data
+        (`identification.experiments.residuals.log_likelihood_ratio`); NaN where the noise is unknown.
     kept
-        Whether the element is in the model.
+        Whether the elements were kept then: added if they pay, left out if they do not.
     """
 
-    laws: tuple[str, ...]
-    between: tuple[str, ...]
+    elements: tuple[str, ...]
+    compared: tuple[str, ...] = ()
     error: float
     gain: float
-    at_least: float
+    likelihood: float = math.nan
     kept: bool
 
+
+class Scores(NamedTuple):
+    """How well a model fits, to be compared with others on the same data."""
+
+    errors: Float
+    """float[n_experiments], relative RMS errors; inf if there is no model."""
+    residuals: ResidualAndNoise | None = None
+    """The residual against the noise, float[n_experiments, n_outputs] each; None if it is not known."""
+
     @classmethod
-    def of(
-        cls,
-        model: StructuredModel,
-        before: StructuredModel | None,
-        plan: ElementPlan,
-        validation: Sequence[Experiment],
-    ) -> "ElementTrial":
-        """Compare a model with the one that has an element less; None for the first element."""
-        error = gain = at_least = np.nan
-        if validation:
-            own = errors_of(model, validation).overall
-            error = float(np.sqrt(np.mean(own**2)))
-            if before is not None:
-                gain, at_least = _gain(errors_of(before, validation).overall, own)
+    def of(cls, model: StructuredModel, experiments: Sequence[Experiment]) -> "Scores":
+        """Simulate all experiments."""
+        runs = [model.simulate_experiment(one) for one in experiments]
+        waiting = iter(runs)
+        residuals = [
+            residual_and_noise(one, run.outputs[:, one.counted_from :])
+            for one, run in zip(experiments, runs, strict=True)
+        ]
         return cls(
-            laws=tuple(law.kind for law in plan.laws),
-            between=plan.between,
-            error=error,
-            gain=gain,
-            at_least=at_least,
-            kept=before is None or not validation or (gain if np.isnan(at_least) else at_least) >= _LEAST_GAIN,
+            errors_of(model, experiments, lambda _: next(waiting)).overall,
+            ResidualAndNoise(*(np.array(part) for part in zip(*residuals, strict=True))),
         )
 
+    @property
+    def size(self) -> float:
+        """Geometric mean of the errors."""
+        return float(np.exp(np.mean(np.log(np.maximum(self.errors, np.finfo(float).tiny)))))
 
-def _gain(before: Float, after: Float) -> tuple[float, float]:
-    from scipy.stats import t  # only on use: it takes long to load
+    @property
+    def rms(self) -> float:
+        """RMS of the errors."""
+        return float(np.sqrt(np.mean(self.errors**2)))
 
-    ratio = np.log(before / after)
-    if ratio.size < 2:
-        return float(np.exp(ratio[0])), float("nan")
-    limit = np.mean(ratio) - t.ppf(_SURE, ratio.size - 1) * np.std(ratio, ddof=1) / np.sqrt(ratio.size)
-    return float(np.exp(np.mean(ratio))), float(np.exp(limit))
+    def gain_over(self, other: "Scores") -> float:
+        """Return the factor by which errors are smaller than those of another model."""
+        return other.size / self.size
+
+    def likelihood_over(self, smaller: "Scores") -> float:
+        """Return the natural logarithm of the likelihood ratio of this model and a smaller one; NaN if it is not known."""
+        if self.residuals is None or smaller.residuals is None:
+            return math.nan
+        return log_likelihood_ratio(smaller.residuals, self.residuals)
+
+    def pays_over(self, smaller: "Scores", elements: int) -> bool:
+        """Return whether this model, with so many elements more than a smaller one, pays (`ElementTrial`)."""
+        chance = self.likelihood_over(smaller) < LEAST_LIKELIHOOD  # False where it is not known
+        return self.gain_over(smaller) >= LEAST_GAIN**elements and not chance

@@ -4,54 +4,30 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band, same_channels
-from identification.experiments.residuals import lacks_something, residual_over_noise
-from identification.fitting.levenberg_marquardt import Minimum
 from identification.fitting.result import FitProgress, FitResult
-from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
-from identification.models.structured.element_trials import ElementPlan, ElementTrial
+from identification.models.structured.element_trials import ElementPlan, ElementTrial, Scores
 from identification.models.structured.identified import FittedNumber, fitted_numbers
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.model import StructuredModel
-from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
-from identification.models.structured.parameters import HIGHEST, Parameters
-from identification.models.structured.problem import EVALUATIONS, ModalTest, Problem
+from identification.models.structured.parameters import Parameters
+from identification.models.structured.problem import EVALUATIONS
 from identification.models.structured.progress import FitWatch
-from identification.models.structured.start import element_starts, linear_start, with_further_element
+from identification.models.structured.selection import select_elements, usual_fits
+from identification.models.structured.stages import ElementFits, Fitted
+from identification.models.structured.start import linear_start
 from vibrolock.arrays import Float
 
-_ROUGH, _FINE = 3e-2, 2e-4
-"""Relative gains of a step below which the fits before the last one, and the last one, end."""
-_STAGES = {
-    False: ((0.05, False, False), (0.01, False, False), (0.0, False, False), (0.0, False, True)),
-    True: (
-        (0.05, False, False),
-        (0.01, False, False),
-        (0.01, True, False),
-        (0.0, True, False),
-        (0.0, True, True),
-    ),
-}
-"""Damping ratio of the nudging forces in each fit, whether the support is free, and whether directions are; by whether the
-support is asked for. Directions are free in the last stage only: earlier they absorb errors of nudging forces and law."""
-_MISFIT = 0.01
-"""Relative misfit of the samples against which the errors of the modal test are weighed at first; later that of the fit before,
-if it is smaller."""
 _LEAST, _PER_PERIOD = 2, 100.0
 """Fewest steps in a sample, and in a period of the highest excited frequency."""
 _LARGEST_STATIC = 10.0
 """Largest static force relative to the largest RMS of the training forces."""
-_SUPPORT = 0.01
-"""Initial stiffness of the support relative to the first mode's at the drive point. Chosen."""
-_STARTS = 4
-"""Most starts of the fit of one element, as long as noise does not explain the residual. Chosen."""
 _SHARE = 0.1
 """Steps of central differences relative to the standard errors of the numbers. Chosen."""
 
@@ -76,7 +52,7 @@ class StructuredFit(FitResult):
     training_error
         RMS of the residual over that of the outputs, every output relative to its own RMS.
     trials
-        Which elements were fitted, and what they brought.
+        All models that were fitted, in the order in which they were, with what their elements brought.
     steps_left
         Share of the errors of the simulation's steps that no change of the numbers makes up for; 1 if unknown.
     unseen
@@ -143,10 +119,11 @@ def fit_structured(
         Laws of the element (`laws`): what they declare as linear and as tried gets initial values
         from the data.
     elements
-        Elements in place of the one with ``laws``, fitted one after the other, each time all numbers.
+        Elements in place of the one with ``laws``; their order does not matter. With n of them about n (n + 1) / 2 models are
+        fitted, each with all its numbers (`trials` of the result).
     validation
-        Data by which a further element has to pay (`ElementTrial`): the first that does not is left out, and those after it.
-        Without them all elements are kept.
+        Data that say which elements are kept (`ElementTrial`): forward, with a backward look, and in pairs where none pays
+        alone. Without them all are kept.
     reach
         Largest displacement of the laws relative to the largest of the mode in the training data.
     support
@@ -177,33 +154,30 @@ def fit_structured(
         steps = _LEAST if band is None else max(_LEAST, math.ceil(_PER_PERIOD * band[1] / first.sample_rate_hz))
     IdentificationError.unless_at_least("steps", steps, 1)
     wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
-    watch = FitWatch(progress, len(wanted), EVALUATIONS)
     linear = linear_start(modes, first, steps)
-    linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
-    nudged = min(len(modes.frequency_hz), len(first.outputs))  # modes whose motion the outputs tell apart
+    names = tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments))
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
     known = 0.0 if isinstance(support, bool) else float(support)
     if not 0.0 <= known < math.inf:
         raise IdentificationError(f"is {known:g} N/m", field="support", allowed="0 or above, True or False")
-    found, trials, evaluations, iterations = replace(linear, support_largest_n=largest, support_n_m=known), [], 0, 0
-    kept: _Fitted | None = None
     for plan in wanted:
-        if found.elements or plan.between:
-            starts = [with_further_element(found, experiments, nudged, plan, reach)]
-        else:
-            with threads():  # its matrices are too small to share
-                starts = element_starts(found, experiments, nudged, plan.laws, reach)
-        fitted = _best_fitted(
-            starts[: _STARTS if len(wanted) == 1 else 1],  # of several, the first is expected to leave a residual
-            lambda start: _fitted(start, linear, modes, experiments, nudged, support is True, watch),
-        )
-        evaluations, iterations = evaluations + fitted.evaluations, iterations + fitted.iterations
-        trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
-        trials.append(trial)
-        if not trial.kept:
-            break
-        kept, found = fitted, fitted.model
-    assert kept is not None  # the first element is always kept
+        linear.output_selector(plan.between)  # refused here, not after the fits of others
+    fits = ElementFits(
+        modes,
+        experiments,
+        replace(linear, training=names, support_largest_n=largest, support_n_m=known),
+        reach=reach,
+        support=support is True,
+        alone=len(wanted) == 1,
+        watch=FitWatch(progress, usual_fits(len(wanted)), EVALUATIONS),
+    )
+
+    def score(fitted: Fitted) -> Scores:
+        if validation:
+            return Scores.of(fitted.model, validation)
+        return Scores(np.array([fitted.problem.error(fitted.last.vector)]))
+
+    kept, trials = select_elements(wanted, fits, score, selective=bool(validation))
     covariance, steps_left, unseen = kept.problem.uncertainty(kept.last.vector)
     return StructuredFit(
         model=kept.model.trained_with(experiments),
@@ -212,95 +186,15 @@ def fit_structured(
         values=kept.last.vector,
         covariance=covariance,
         training_error=kept.problem.error(kept.last.vector),
-        evaluations=evaluations,
-        iterations=iterations,
+        evaluations=fits.evaluations,
+        iterations=fits.iterations,
         seconds=time.perf_counter() - began,
         status=kept.last.ending.status,
         message=kept.last.ending.message,
-        trials=tuple(trials),
+        trials=trials,
         steps_left=steps_left,
         unseen=tuple(name for name, one in zip(kept.problem.parameters.names, unseen, strict=True) if one),
     )
-
-
-class _Fitted(NamedTuple):
-    model: StructuredModel
-    start: StructuredModel
-    problem: Problem
-    last: Minimum
-    evaluations: int
-    iterations: int
-
-    def lacks_something(self) -> bool:
-        """Whether the residual of any experiment is more than noise and not small (`lacks_something`)."""
-        for experiment in self.problem.experiments:
-            simulated = self.model.simulate_experiment(experiment).outputs[:, experiment.counted_from :]
-            measured = experiment.counted_outputs
-            error = np.linalg.norm(simulated - measured, axis=1) / np.linalg.norm(measured, axis=1)
-            if np.any(lacks_something(residual_over_noise(experiment, simulated), error)):
-                return True
-        return False
-
-
-def _best_fitted(starts: Sequence[StructuredModel], fit: Callable[[StructuredModel], _Fitted]) -> _Fitted:
-    """Return the first fit whose residual the noise explains, or of all the one with the least error."""
-    fitted = []
-    for start in starts:
-        try:
-            fitted.append(fit(start))
-        except IdentificationError:
-            if not fitted:
-                raise
-            continue  # a further start that cannot be fitted takes nothing from the first
-        if not fitted[-1].lacks_something():
-            break
-    best = min(fitted, key=lambda one: one.problem.error(one.last.vector))
-    evaluations, iterations = (
-        sum(counts) for counts in zip(*((one.evaluations, one.iterations) for one in fitted), strict=True)
-    )
-    return best._replace(evaluations=evaluations, iterations=iterations)
-
-
-def _fitted(
-    start: StructuredModel,
-    linear: StructuredModel,
-    modes: LinearModes,
-    experiments: Sequence[Experiment],
-    nudged: int,
-    support: bool,
-    watch: FitWatch,
-) -> _Fitted:
-    """Fit all numbers, in stages with smaller and smaller nudging forces."""
-    tied = (find_role(start.outputs, "drive"),)
-    stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
-    found, evaluations, iterations, misfit = start, 0, 0, _MISFIT
-    seen = float(linear.frequency_hz[-1]) < 0.5 * linear.sample_rate_hz  # the last may be the residual's
-    poles = len(linear.frequency_hz if seen else modes.frequency_hz)
-    # fits before the last one take half of the steps, as long as every mode may rise by a fifth
-    needed = 1.2 * float(np.max(start.frequency_hz)) / (HIGHEST * start.sample_rate_hz)
-    rough = min(start.steps, max(math.ceil(0.5 * start.steps), math.ceil(needed)))
-    slowest = float(np.min((linear.omega * linear.damping_ratio)[:nudged]))
-    for number, (ratio, free, turned) in enumerate(_STAGES[support], 1):
-        watch.begin(f"stage {number} of {len(_STAGES[support])}")
-        if free and not found.support_n_m:
-            found = replace(found, support_n_m=stiffness)
-        # the last fit runs without nudging for so long before it counts that its effect has decayed
-        lengths = [0 if ratio or not e.period_samples else settling_periods(e, slowest) for e in experiments]
-        settled = [with_lead_in_periods(e, count) for e, count in zip(experiments, lengths, strict=True)]
-        begun = start if turned else replace(start, steps=rough)
-        nudgings = [
-            Nudging.of(linear, e, nudged, ratio, begun.steps, e.counted_from - count * e.period_samples)
-            if e.period_samples
-            else None
-            for e, count in zip(settled, lengths, strict=True)
-        ]
-        parameters = Parameters(begun, tied, free, turned, poles)
-        problem = Problem(parameters, settled, nudgings, ModalTest(parameters, modes, linear), misfit, watch)
-        end = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
-        found = parameters.model(end.vector)
-        evaluations, iterations = evaluations + end.evaluations, iterations + end.iterations
-        misfit = min(_MISFIT, problem.error(end.vector))
-    return _Fitted(found, start, problem, end, evaluations, iterations)
 
 
 def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> Float:

@@ -13,16 +13,22 @@ _LEAST, _MOST = 30.0, 120.0
 
 
 class FitWatch:
-    """Calls ``progress`` after every linearisation of a fit with so many elements, ``iterations`` at most in a stage."""
+    """Calls ``progress`` after every linearisation of about so many fits, ``iterations`` at most in a stage."""
 
-    def __init__(self, progress: Callable[[FitProgress], None] | None, elements: int, iterations: int) -> None:
-        self._progress, self._elements, self._iterations = progress, elements, iterations
+    def __init__(self, progress: Callable[[FitProgress], None] | None, fits: int, iterations: int) -> None:
+        self._progress, self._fits, self._iterations = progress, fits, iterations
+        self._fit = 0
         self._began_s = time.perf_counter()
         self._stage, self._iteration, self._seen = "", 0, 0
 
+    def begin_fit(self) -> None:
+        """Note that a fit begins."""
+        self._fit += 1
+
     def begin(self, stage: str) -> None:
         """Note that a stage begins."""
-        self._stage, self._iteration = stage, 0
+        fit = f"fit {self._fit} of about {self._fits}, " if self._fits > 1 else ""
+        self._stage, self._iteration = fit + stage, 0
 
     def linearised(self, error: float, took_s: float) -> None:
         """Note a linearisation: the relative error before it, and how long it took."""
@@ -38,7 +44,7 @@ class FitWatch:
                     damping=math.nan,
                     seconds=time.perf_counter() - self._began_s,
                     stage=self._stage,
-                    usual_s=(_LEAST * self._elements * took_s, _MOST * self._elements * took_s) if timed else None,
+                    usual_s=(_LEAST * self._fits * took_s, _MOST * self._fits * took_s) if timed else None,
                 )
             )
         self._iteration += 1

@@ -171,12 +171,26 @@ def _say_numbers(summary: dict[str, Any]) -> None:
 
 
 def _say_trials(trials: list[dict[str, Any]]) -> None:
-    for trial in (trial for trial in trials if np.isfinite(trial["gain"])):
-        sure = f", {trial['at_least']:.3g} at least (95 %)" if np.isfinite(trial["at_least"]) else ", one experiment"
-        what = "kept" if trial["kept"] else "left out"
-        print(
-            f"element with {', '.join(trial['laws'])}: errors in validation {trial['gain']:.3g} times smaller{sure}; {what}"
-        )
+    if len(trials) < 2 or not any(np.isfinite(trial["error"]) for trial in trials):
+        return
+    print(f"elements that were tried, {len(trials)} fits")
+    print_rows(
+        [
+            {
+                **trial,
+                "tried": " + ".join(trial["elements"]),
+                "beside": " + ".join(trial["compared"]) or "-",
+                "result": "kept" if trial["kept"] else "-",
+            }
+            for trial in trials
+        ],
+        Column("tried", "elements"),
+        Column("error", "error", "%", ".4g", 100.0),
+        Column("beside", "compared with"),
+        Column("gain", "times smaller", "", ".3g"),
+        Column("likelihood", "log likelihood", "", "+.3g"),
+        Column("result", "result"),
+    )
 
 
 def _say_modes(modes: _Modes) -> None:

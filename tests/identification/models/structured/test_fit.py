@@ -10,9 +10,10 @@ from identification import Channel, IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.models.simulated_runs import simulated_run
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.fit import _best_fitted, fit_structured
+from identification.models.structured.fit import fit_structured
 from identification.models.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring
 from identification.models.structured.parameters import Parameters
+from identification.models.structured.stages import best_fitted
 from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
 from tests.refused import refused
 
@@ -133,7 +134,7 @@ def test_where_noise_does_not_explain_the_residual_the_fit_begins_again_elsewher
     assert found.training_error < 2e-3
     (element,) = found.model.elements
     assert element.scale_m * element.laws[1].slip == pytest.approx(0.5e-3, rel=0.02)
-    monkeypatch.setattr("identification.models.structured.fit._STARTS", 1)
+    monkeypatch.setattr("identification.models.structured.stages._STARTS", 1)
     once = fit_structured(linear_modes(true, 1), [data], support=False, laws=laws)
     assert once.training_error > 5e-3
     assert once.evaluations < found.evaluations
@@ -153,10 +154,10 @@ def test_a_further_start_that_cannot_be_fitted_leaves_the_first_fit():
         problem = SimpleNamespace(error=lambda _: 0.1)
         return Fitted(start=start, problem=problem, last=SimpleNamespace(vector=None), evaluations=3, iterations=2)
 
-    found = _best_fitted(["first", "second"], fit)
+    found = best_fitted(["first", "second"], fit)
     assert (found.start, found.evaluations, found.iterations) == ("first", 3, 2)
     with pytest.raises(IdentificationError):
-        _best_fitted(["second", "first"], fit)
+        best_fitted(["second", "first"], fit)
 
 
 @pytest.mark.slow

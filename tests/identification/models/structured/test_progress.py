@@ -7,9 +7,9 @@ from identification.models.structured.progress import FitWatch
 
 
 def told(took_s):
-    """Return what is told after linearisations of two elements that took so long, s."""
+    """Return what is told after linearisations of two fits that took so long, s."""
     seen: list[FitProgress] = []
-    watch = FitWatch(seen.append, elements=2, iterations=100)
+    watch = FitWatch(seen.append, fits=2, iterations=100)
     watch.begin("stage 1 of 4")
     for seconds in took_s:
         watch.linearised(0.5, seconds)
@@ -23,7 +23,7 @@ def test_the_usual_time_follows_from_the_second_linearisation_alone():
 
 def test_iterations_are_counted_by_stage():
     seen: list[FitProgress] = []
-    watch = FitWatch(seen.append, elements=1, iterations=100)
+    watch = FitWatch(seen.append, fits=1, iterations=100)
     for stage in ("stage 1 of 2", "stage 2 of 2"):
         watch.begin(stage)
         watch.linearised(0.5, 1.0)
@@ -34,3 +34,13 @@ def test_iterations_are_counted_by_stage():
         ("stage 2", 0),
         ("stage 2", 1),
     ]
+
+
+def test_of_several_fits_the_stage_says_which():
+    seen: list[FitProgress] = []
+    watch = FitWatch(seen.append, fits=3, iterations=100)
+    for _ in range(2):
+        watch.begin_fit()
+        watch.begin("stage 1 of 4")
+        watch.linearised(0.5, 1.0)
+    assert [at.stage for at in seen] == ["fit 1 of about 3, stage 1 of 4", "fit 2 of about 3, stage 1 of 4"]

@@ -1,0 +1,187 @@
+"""The fit of one structured model: from its starts, each in stages with smaller and smaller nudging forces."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.channels import find_role
+from identification.errors import IdentificationError
+from identification.experiments.experiment import Experiment
+from identification.experiments.residuals import lacks_something, residual_over_noise
+from identification.fitting.levenberg_marquardt import Minimum
+from identification.fitting.threads import threads
+from identification.linear.modes import LinearModes
+from identification.models.structured.element_trials import ElementPlan
+from identification.models.structured.model import StructuredModel
+from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
+from identification.models.structured.parameters import HIGHEST, Parameters
+from identification.models.structured.problem import ModalTest, Problem
+from identification.models.structured.progress import FitWatch
+from identification.models.structured.start import element_starts, with_further_element
+
+_ROUGH, _FINE = 3e-2, 2e-4
+"""Relative gains of a step below which the fits before the last one, and the last one, end."""
+_STAGES = {
+    False: ((0.05, False, False), (0.01, False, False), (0.0, False, False), (0.0, False, True)),
+    True: (
+        (0.05, False, False),
+        (0.01, False, False),
+        (0.01, True, False),
+        (0.0, True, False),
+        (0.0, True, True),
+    ),
+}
+"""Damping ratio of the nudging forces in each fit, whether the support is free, and whether directions are; by whether the
+support is asked for. Directions are free in the last stage only: earlier they absorb errors of nudging forces and law."""
+_MISFIT = 0.01
+"""Relative misfit of the samples against which the errors of the modal test are weighed at first; later that of the fit before,
+if it is smaller."""
+_SUPPORT = 0.01
+"""Initial stiffness of the support relative to the first mode's at the drive point. Chosen."""
+_STARTS = 4
+"""Most starts of the fit of one element, as long as noise does not explain the residual. Chosen."""
+
+
+class Fitted(NamedTuple):
+    """A fitted model."""
+
+    model: StructuredModel
+    start: StructuredModel
+    problem: Problem
+    last: Minimum
+    evaluations: int
+    iterations: int
+
+    def lacks_something(self) -> bool:
+        """Whether the residual of any experiment is more than noise and not small (`lacks_something`)."""
+        for experiment in self.problem.experiments:
+            simulated = self.model.simulate_experiment(experiment).outputs[:, experiment.counted_from :]
+            measured = experiment.counted_outputs
+            error = np.linalg.norm(simulated - measured, axis=1) / np.linalg.norm(measured, axis=1)
+            if np.any(lacks_something(residual_over_noise(experiment, simulated), error)):
+                return True
+        return False
+
+
+def best_fitted(starts: Sequence[StructuredModel], fit: Callable[[StructuredModel], Fitted]) -> Fitted:
+    """Return the first fit whose residual the noise explains, or of all the one with the least error."""
+    fitted = []
+    for start in starts:
+        try:
+            fitted.append(fit(start))
+        except IdentificationError:
+            if not fitted:
+                raise
+            continue  # a further start that cannot be fitted takes nothing from the first
+        if not fitted[-1].lacks_something():
+            break
+    best = min(fitted, key=lambda one: one.problem.error(one.last.vector))
+    evaluations, iterations = (
+        sum(counts) for counts in zip(*((one.evaluations, one.iterations) for one in fitted), strict=True)
+    )
+    return best._replace(evaluations=evaluations, iterations=iterations)
+
+
+class ElementFits:
+    """Fits of all numbers of a model that has more elements than another, or than the ``linear`` one.
+
+    Parameters
+    ----------
+    modes, experiments
+        What the models are fitted to.
+    linear
+        The model without elements.
+    reach
+        Largest displacement of the laws relative to the largest in the training data.
+    support
+        Whether the support is fitted.
+    alone
+        Whether there is one element only: then its fit begins again while its residual is more than noise. Of several the
+        first is expected to leave a residual.
+    watch
+        Is told of every linearisation.
+    """
+
+    def __init__(
+        self,
+        modes: LinearModes,
+        experiments: Sequence[Experiment],
+        linear: StructuredModel,
+        *,
+        reach: float,
+        support: bool,
+        alone: bool,
+        watch: FitWatch,
+    ) -> None:
+        self._modes, self._experiments, self._linear, self._watch = modes, experiments, linear, watch
+        self._reach, self._support, self._starts = reach, support, _STARTS if alone else 1
+        self._nudged = min(len(modes.frequency_hz), len(linear.outputs))  # modes whose motion the outputs tell apart
+        self.evaluations = self.iterations = 0
+
+    def __call__(self, before: Fitted | None, plans: Sequence[ElementPlan]) -> Fitted:
+        """Return the fit with further elements; None for the model without elements."""
+        self._watch.begin_fit()
+        found = self._linear if before is None else before.model
+        for plan in plans[:-1]:
+            found = self._starts_with(found, plan)[0]
+        starts = self._starts_with(found, plans[-1])
+        fitted = best_fitted(starts[: self._starts], self._from)
+        self.evaluations, self.iterations = (
+            self.evaluations + fitted.evaluations,
+            self.iterations + fitted.iterations,
+        )
+        return fitted
+
+    def _starts_with(self, model: StructuredModel, plan: ElementPlan) -> list[StructuredModel]:
+        if model.elements or plan.between:
+            return [with_further_element(model, self._experiments, self._nudged, plan, self._reach)]
+        with threads():  # its matrices are too small to share
+            return element_starts(model, self._experiments, self._nudged, plan.laws, self._reach)
+
+    def _from(self, start: StructuredModel) -> Fitted:
+        return _fitted(start, self._linear, self._modes, self._experiments, self._nudged, self._support, self._watch)
+
+
+def _fitted(
+    start: StructuredModel,
+    linear: StructuredModel,
+    modes: LinearModes,
+    experiments: Sequence[Experiment],
+    nudged: int,
+    support: bool,
+    watch: FitWatch,
+) -> Fitted:
+    """Fit all numbers, in stages with smaller and smaller nudging forces."""
+    tied = (find_role(start.outputs, "drive"),)
+    stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
+    found, evaluations, iterations, misfit = start, 0, 0, _MISFIT
+    seen = float(linear.frequency_hz[-1]) < 0.5 * linear.sample_rate_hz  # the last may be the residual's
+    poles = len(linear.frequency_hz if seen else modes.frequency_hz)
+    # fits before the last one take half of the steps, as long as every mode may rise by a fifth
+    needed = 1.2 * float(np.max(start.frequency_hz)) / (HIGHEST * start.sample_rate_hz)
+    rough = min(start.steps, max(math.ceil(0.5 * start.steps), math.ceil(needed)))
+    slowest = float(np.min((linear.omega * linear.damping_ratio)[:nudged]))
+    for number, (ratio, free, turned) in enumerate(_STAGES[support], 1):
+        watch.begin(f"stage {number} of {len(_STAGES[support])}")
+        if free and not found.support_n_m:
+            found = replace(found, support_n_m=stiffness)
+        # the last fit runs without nudging for so long before it counts that its effect has decayed
+        lengths = [0 if ratio or not e.period_samples else settling_periods(e, slowest) for e in experiments]
+        settled = [with_lead_in_periods(e, count) for e, count in zip(experiments, lengths, strict=True)]
+        begun = start if turned else replace(start, steps=rough)
+        nudgings = [
+            Nudging.of(linear, e, nudged, ratio, begun.steps, e.counted_from - count * e.period_samples)
+            if e.period_samples
+            else None
+            for e, count in zip(settled, lengths, strict=True)
+        ]
+        parameters = Parameters(begun, tied, free, turned, poles)
+        problem = Problem(parameters, settled, nudgings, ModalTest(parameters, modes, linear), misfit, watch)
+        end = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
+        found = parameters.model(end.vector)
+        evaluations, iterations = evaluations + end.evaluations, iterations + end.iterations
+        misfit = min(_MISFIT, problem.error(end.vector))
+    return Fitted(found, start, problem, end, evaluations, iterations)
