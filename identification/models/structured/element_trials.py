@@ -3,10 +3,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.experiments.errors import errors_of
@@ -14,10 +13,11 @@ from identification.experiments.experiment import Experiment
 from identification.experiments.residuals import ResidualAndNoise, log_likelihood_ratio, residual_and_noise
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.model import StructuredModel
-from identification.storage import stored
 from identification.validation import convert_fields
 from vibrolock.arrays import Float
 
+_SURE = 0.95
+"""Confidence of what is told of the gain."""
 LEAST_GAIN = 1.05
 """Smallest factor by which errors have to fall for each further element. Chosen."""
 LEAST_LIKELIHOOD = math.log(1.0 / 0.05)
@@ -56,16 +56,6 @@ class ElementPlan:
         return ",".join(law.kind for law in self.laws) + ("@" if self.between else "") + ":".join(self.between)
 
 
-def _upgrade(_arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
-    """Read a trial of an earlier file, which names the last of its elements only."""
-    if "laws" in attributes:
-        between = ":".join(attributes.pop("between"))
-        name = ",".join(attributes.pop("laws"))
-        attributes["elements"] = [f"{name}@{between}" if between else name]
-        attributes.pop("at_least")
-
-
-@stored(upgrade=_upgrade)
 @dataclass(frozen=True, kw_only=True)
 class ElementTrial:
     """A fitted model with some of the elements, compared with the model that was kept until then.
@@ -81,8 +71,10 @@ class ElementTrial:
 
     Parameters
     ----------
+    laws, between
+        Kinds of laws and outputs of the element that was added (of a pair the last one) or left out.
     elements
-        The model's elements, with kinds of laws and places as in ``jenkins@tip:drive``, in its order.
+        The model's elements, with kinds of laws and places as in ``jenkins@tip:drive``, in its order; empty in earlier files.
     compared
         Elements of the model with which it is compared; empty if with none.
     error
@@ -90,6 +82,9 @@ class ElementTrial:
     gain
         Factor by which errors are smaller than those of the model with which it is compared; below 1 if they are larger, NaN
         without that model or without data.
+    at_least
+        Lower limit of the gain, 95 % sure by Student's t over experiments; NaN with fewer than two. It decides nothing: two or
+        three experiments of the same gain tell little of its scatter.
     likelihood
         Natural logarithm of the likelihood ratio of the larger of both to the smaller, on the validation data
         (`identification.experiments.residuals.log_likelihood_ratio`); NaN where the noise is unknown.
@@ -97,10 +92,13 @@ class ElementTrial:
         Whether the elements were kept then: added if they pay, left out if they do not.
     """
 
-    elements: tuple[str, ...]
+    laws: tuple[str, ...]
+    between: tuple[str, ...]
+    elements: tuple[str, ...] = ()
     compared: tuple[str, ...] = ()
     error: float
     gain: float
+    at_least: float
     likelihood: float = math.nan
     kept: bool
 
@@ -140,6 +138,16 @@ class Scores(NamedTuple):
     def gain_over(self, other: "Scores") -> float:
         """Return the factor by which errors are smaller than those of another model."""
         return other.size / self.size
+
+    def gain_at_least(self, other: "Scores") -> float:
+        """Return the lower limit of `gain_over`, 95 % sure by Student's t over experiments; NaN with fewer than two."""
+        from scipy.stats import t  # only on use: it takes long to load
+
+        if self.errors.size < 2 or not np.all(np.isfinite(self.errors)):
+            return math.nan
+        ratio = np.log(other.errors / self.errors)
+        half = t.ppf(_SURE, ratio.size - 1) * np.std(ratio, ddof=1) / np.sqrt(ratio.size)
+        return float(np.exp(np.mean(ratio) - half))
 
     def likelihood_over(self, smaller: "Scores") -> float:
         """Return the natural logarithm of the likelihood ratio of this model and a smaller one; NaN if it is not known."""

@@ -12,7 +12,7 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band, same_channels
 from identification.fitting.result import FitProgress, FitResult
 from identification.linear.modes import LinearModes
-from identification.models.structured.element_trials import ElementPlan, ElementTrial, Scores
+from identification.models.structured.element_trials import ElementPlan, ElementTrial
 from identification.models.structured.identified import FittedNumber, fitted_numbers
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.model import StructuredModel
@@ -20,7 +20,7 @@ from identification.models.structured.parameters import Parameters
 from identification.models.structured.problem import EVALUATIONS
 from identification.models.structured.progress import FitWatch
 from identification.models.structured.selection import select_elements, usual_fits
-from identification.models.structured.stages import ElementFits, Fitted
+from identification.models.structured.stages import ElementFits
 from identification.models.structured.start import linear_start
 from vibrolock.arrays import Float
 
@@ -165,6 +165,7 @@ def fit_structured(
     fits = ElementFits(
         modes,
         experiments,
+        validation,
         replace(linear, training=names, support_largest_n=largest, support_n_m=known),
         reach=reach,
         support=support is True,
@@ -172,12 +173,7 @@ def fit_structured(
         watch=FitWatch(progress, usual_fits(len(wanted)), EVALUATIONS),
     )
 
-    def score(fitted: Fitted) -> Scores:
-        if validation:
-            return Scores.of(fitted.model, validation)
-        return Scores(np.array([fitted.problem.error(fitted.last.vector)]))
-
-    kept, trials = select_elements(wanted, fits, score, selective=bool(validation))
+    kept, trials = select_elements(wanted, fits, selective=bool(validation))
     covariance, steps_left, unseen = kept.problem.uncertainty(kept.last.vector)
     return StructuredFit(
         model=kept.model.trained_with(experiments),

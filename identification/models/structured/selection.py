@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,22 @@ def usual_fits(plans: int) -> int:
     return plans * (plans + 1) // 2
 
 
+class Fits(Protocol[T]):
+    """Fits of models, each from another one."""
+
+    def more(self, before: T | None, plans: Sequence[ElementPlan]) -> T:
+        """Return the fit with further elements; None for the model without any."""
+
+    def less(self, larger: T, position: int) -> T:
+        """Return the fit without the element at a position, from a fit that has it."""
+
+    def scores(self, fit: T) -> Scores:
+        """Return how well a model fits."""
+
+    def scores_without(self, larger: T, position: int) -> Scores:
+        """Return how well it fits with an element taken out and nothing fitted again."""
+
+
 class Selected(NamedTuple, Generic[T]):
     """What a selection found."""
 
@@ -43,42 +59,38 @@ class _Tried(NamedTuple, Generic[T]):
     scores: Scores
 
 
-def select_elements(
-    plans: Sequence[ElementPlan],
-    fit: Callable[[T | None, Sequence[ElementPlan]], T],
-    score: Callable[[T], Scores],
-    selective: bool = True,
-) -> Selected[T]:
+def select_elements(plans: Sequence[ElementPlan], fits: Fits[T], selective: bool = True) -> Selected[T]:
     """Select elements forward, with a backward look.
 
     First each element is fitted alone, and the best is kept. In each further round each remaining element is fitted beside
     those kept, and the best of them is kept if it pays (`ElementTrial`). If none does, all pairs of them are fitted, and the
-    best pair is kept if it pays; otherwise the search ends. After each addition earlier elements are left out in turn, as long
-    as the model with them does not pay over the one without; they do not come back. Models that were fitted in earlier rounds
-    were worse than the one kept then, and are not looked at again.
+    best pair is kept if it pays; otherwise the search ends. After each addition elements are left out in turn, as long as the
+    model with them does not pay over the one without; they do not come back.
 
-    Of n elements the rounds take n (n + 1) / 2 fits, and somewhat more if a pair pays; each addition to k elements takes up to
-    k - 1 to leave one out. A model is fitted from the best fit that has an element less, if there is one. Listed in another
-    order, the same elements give the same fits. An element that cannot be fitted counts as one that does not pay, unless none
-    can.
+    What is left out is fitted if it was not yet, or if its fit has larger errors than the larger model with the element taken
+    out and nothing fitted again: then that fit ended in a local minimum, which an addition has left, needed or not. Other
+    models that were fitted before were worse than those that were kept.
+
+    Of n elements the rounds take n (n + 1) / 2 fits, more if a pair pays; after each addition to k elements up to k - 2 are
+    fitted to leave one out, more after local minima. A model is fitted from the best fit that has an element less, if there
+    is one. Listed in another order, the same elements give the same fits. An element that cannot be fitted counts as one that
+    does not pay, unless none can.
 
     Parameters
     ----------
     plans
         The elements, one at least.
-    fit
-        Returns the fit of a model with further elements; None for the model without elements.
-    score
-        Returns its errors.
+    fits
+        Fits models.
     selective
-        False: all elements are kept, added as the errors say, and nothing is left out.
+        False: all elements are kept, added as their scores say, and nothing is left out.
     """
-    search = _Search(plans, fit, score, selective)
+    search = _Search(plans, fits, selective)
     kept = search.first()
     rest = _without(search.all, kept.elements)
     while rest and (larger := search.further(kept, rest)):
-        new = _without(larger.elements, kept.elements)
-        kept, rest = search.reduced(larger, new), _without(rest, new)
+        rest = _without(rest, _without(larger.elements, kept.elements))
+        kept = search.reduced(larger)
     if rest and not selective and search.refusal is not None:
         raise search.refusal
     assert kept.fit is not None
@@ -93,11 +105,10 @@ class _Search(Generic[T]):
     def __init__(
         self,
         plans: Sequence[ElementPlan],
-        fit: Callable[[T | None, Sequence[ElementPlan]], T],
-        score: Callable[[T], Scores],
+        fits: Fits[T],
         selective: bool,
     ) -> None:
-        self._fit, self._score, self._selective = fit, score, selective
+        self._fits, self._selective = fits, selective
         named = {_key(plan): plan for plan in plans}
         keys = sorted(named)
         self._plans = [named[key] for key in keys]
@@ -127,12 +138,11 @@ class _Search(Generic[T]):
                 return best
         return None
 
-    def reduced(self, full: _Tried[T], new: Elements) -> _Tried[T]:
-        """Return the model without those earlier elements that do not pay beside the new ones."""
+    def reduced(self, full: _Tried[T]) -> _Tried[T]:
+        """Return the model without those elements that do not pay."""
         kept = full
-        while self._selective:
-            smaller = [_without(kept.elements, (one,)) for one in sorted(set(_without(kept.elements, new)))]
-            tried = [self._tried(one) for one in smaller if one not in self._known]
+        while self._selective and len(kept.elements) > 1:
+            tried = [one for position in range(len(kept.order)) if (one := self._tried_without(kept, position))]
             best = _best(tried)
             spare = best is not None and best.fit is not None and not self._pays(full, best, 1)
             self._note(tried, full, best if spare else None)
@@ -140,6 +150,17 @@ class _Search(Generic[T]):
                 break
             kept = best
         return kept
+
+    def _tried_without(self, larger: _Tried[T], position: int) -> _Tried[T] | None:
+        """Fit the model without an element; None if it was fitted before, to smaller errors than it has now."""
+        assert larger.fit is not None
+        order = (*larger.order[:position], *larger.order[position + 1 :])
+        elements = tuple(sorted(order))
+        before = self._known.get(elements) or self._largest_part(elements)
+        if before is not None and self._fits.scores_without(larger.fit, position).size >= before.scores.size:
+            return None if before.elements == elements else self._tried(elements)
+        found = self._known[elements] = self._attempt(order, lambda: self._fits.less(larger.fit, position))
+        return found
 
     def _pays(self, larger: _Tried[T], smaller: _Tried[T], count: int) -> bool:
         if larger.fit is None or not self._selective:
@@ -153,37 +174,50 @@ class _Search(Generic[T]):
 
     def _fitted(self, elements: Elements) -> _Tried[T]:
         """Fit a model from the best of the largest parts of it that are fitted."""
+        before = self._largest_part(elements)
+        new = _without(elements, () if before is None else before.elements)
+        order = (*(() if before is None else before.order), *new)
+        plans = [self._plans[one] for one in new]
+        return self._attempt(order, lambda: self._fits.more(None if before is None else before.fit, plans))
+
+    def _largest_part(self, elements: Elements) -> _Tried[T] | None:
         parts = [
             one for one in self._known.values() if one.fit is not None and not Counter(one.elements) - Counter(elements)
         ]
         largest = max((len(one.elements) for one in parts), default=0)
-        before = _best([one for one in parts if len(one.elements) == largest])
-        new = _without(elements, () if before is None else before.elements)
-        order = (*(() if before is None else before.order), *new)
+        return _best([one for one in parts if len(one.elements) == largest])
+
+    def _attempt(self, order: Elements, fit: Callable[[], T]) -> _Tried[T]:
         try:
-            fit = self._fit(None if before is None else before.fit, [self._plans[one] for one in new])
+            found = fit()
         except IdentificationError as error:
             self.refusal = self.refusal or error
-            return _Tried(elements, order, None, _UNFITTED)
-        return _Tried(elements, order, fit, self._score(fit))
+            return _Tried(tuple(sorted(order)), order, None, _UNFITTED)
+        return _Tried(tuple(sorted(order)), order, found, self._fits.scores(found))
 
     def _note(self, tried: Sequence[_Tried[T]], compared: _Tried[T] | None, kept: _Tried[T] | None) -> None:
-        for one in tried:
-            gain = likelihood = math.nan
-            if self._selective and compared is not None:
-                gain = one.scores.gain_over(compared.scores)
-                pair = (one, compared) if len(one.elements) > len(compared.elements) else (compared, one)
-                likelihood = pair[0].scores.likelihood_over(pair[1].scores)
-            self.trials.append(
-                ElementTrial(
-                    elements=self._names(one),
-                    compared=() if compared is None else self._names(compared),
-                    error=one.scores.rms if self._selective else math.nan,
-                    gain=gain,
-                    likelihood=likelihood,
-                    kept=one is kept,
-                )
-            )
+        self.trials += [self._trial(one, compared, one is kept) for one in tried]
+
+    def _trial(self, tried: _Tried[T], compared: _Tried[T] | None, kept: bool) -> ElementTrial:
+        gain = at_least = likelihood = math.nan
+        changed = self._plans[tried.order[-1]]
+        if compared is not None:
+            smaller, larger = sorted((tried, compared), key=lambda one: len(one.elements))
+            changed = self._plans[_without(larger.elements, smaller.elements)[-1]]
+            if self._selective:
+                gain, at_least = (of(compared.scores) for of in (tried.scores.gain_over, tried.scores.gain_at_least))
+                likelihood = larger.scores.likelihood_over(smaller.scores)
+        return ElementTrial(
+            laws=tuple(law.kind for law in changed.laws),
+            between=changed.between,
+            elements=self._names(tried),
+            compared=() if compared is None else self._names(compared),
+            error=tried.scores.rms if self._selective else math.nan,
+            gain=gain,
+            at_least=at_least,
+            likelihood=likelihood,
+            kept=kept,
+        )
 
     def _names(self, tried: _Tried[T]) -> tuple[str, ...]:
         return tuple(self._plans[one].name for one in tried.order)

@@ -14,7 +14,7 @@ from identification.experiments.residuals import lacks_something, residual_over_
 from identification.fitting.levenberg_marquardt import Minimum
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
-from identification.models.structured.element_trials import ElementPlan
+from identification.models.structured.element_trials import ElementPlan, Scores
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
 from identification.models.structured.parameters import HIGHEST, Parameters
@@ -92,6 +92,8 @@ class ElementFits:
     ----------
     modes, experiments
         What the models are fitted to.
+    validation
+        Data on which they are compared; without any the training data.
     linear
         The model without elements.
     reach
@@ -109,6 +111,7 @@ class ElementFits:
         self,
         modes: LinearModes,
         experiments: Sequence[Experiment],
+        validation: Sequence[Experiment],
         linear: StructuredModel,
         *,
         reach: float,
@@ -116,23 +119,39 @@ class ElementFits:
         alone: bool,
         watch: FitWatch,
     ) -> None:
-        self._modes, self._experiments, self._linear, self._watch = modes, experiments, linear, watch
+        self._modes, self._experiments, self._validation = modes, experiments, validation
+        self._linear, self._watch = linear, watch
         self._reach, self._support, self._starts = reach, support, _STARTS if alone else 1
         self._nudged = min(len(modes.frequency_hz), len(linear.outputs))  # modes whose motion the outputs tell apart
         self.evaluations = self.iterations = 0
 
-    def __call__(self, before: Fitted | None, plans: Sequence[ElementPlan]) -> Fitted:
+    def more(self, before: Fitted | None, plans: Sequence[ElementPlan]) -> Fitted:
         """Return the fit with further elements; None for the model without elements."""
         self._watch.begin_fit()
         found = self._linear if before is None else before.model
         for plan in plans[:-1]:
             found = self._starts_with(found, plan)[0]
         starts = self._starts_with(found, plans[-1])
-        fitted = best_fitted(starts[: self._starts], self._from)
-        self.evaluations, self.iterations = (
-            self.evaluations + fitted.evaluations,
-            self.iterations + fitted.iterations,
-        )
+        return self._counted(best_fitted(starts[: self._starts], self._from))
+
+    def less(self, larger: Fitted, position: int) -> Fitted:
+        """Return the fit without the element at a position, from a fit that has it."""
+        self._watch.begin_fit()
+        return self._counted(self._from(_taken_out(larger.model, position)))
+
+    def scores(self, fit: Fitted) -> Scores:
+        """Return the errors on the validation data; without any, that on the training data."""
+        if self._validation:
+            return Scores.of(fit.model, self._validation)
+        return Scores(np.array([fit.problem.error(fit.last.vector)]))
+
+    def scores_without(self, larger: Fitted, position: int) -> Scores:
+        """Return the errors on the validation data with an element taken out and nothing fitted again."""
+        return Scores.of(_taken_out(larger.model, position), self._validation)
+
+    def _counted(self, fitted: Fitted) -> Fitted:
+        self.evaluations += fitted.evaluations
+        self.iterations += fitted.iterations
         return fitted
 
     def _starts_with(self, model: StructuredModel, plan: ElementPlan) -> list[StructuredModel]:
@@ -143,6 +162,10 @@ class ElementFits:
 
     def _from(self, start: StructuredModel) -> Fitted:
         return _fitted(start, self._linear, self._modes, self._experiments, self._nudged, self._support, self._watch)
+
+
+def _taken_out(model: StructuredModel, position: int) -> StructuredModel:
+    return replace(model, elements=(*model.elements[:position], *model.elements[position + 1 :]))
 
 
 def _fitted(

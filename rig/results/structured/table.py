@@ -173,23 +173,23 @@ def _say_numbers(summary: dict[str, Any]) -> None:
 def _say_trials(trials: list[dict[str, Any]]) -> None:
     if len(trials) < 2 or not any(np.isfinite(trial["error"]) for trial in trials):
         return
-    print(f"elements that were tried, {len(trials)} fits")
+    print(f"models that were fitted, {len(trials)}, by the elements that they have")
     print_rows(
         [
             {
                 **trial,
-                "tried": " + ".join(trial["elements"]),
-                "beside": " + ".join(trial["compared"]) or "-",
-                "result": "kept" if trial["kept"] else "-",
+                "has": " + ".join(trial["elements"] or trial["laws"]),
+                "than": " + ".join(trial["compared"]) or "-",
+                "verdict": "kept" if trial["kept"] else "-",
             }
             for trial in trials
         ],
-        Column("tried", "elements"),
-        Column("error", "error", "%", ".4g", 100.0),
-        Column("beside", "compared with"),
+        Column("has", "elements"),
+        Column("error", "error in validation", "%", ".4g", 100.0),
         Column("gain", "times smaller", "", ".3g"),
-        Column("likelihood", "log likelihood", "", "+.3g"),
-        Column("result", "result"),
+        Column("than", "than with"),
+        Column("likelihood", "log-likelihood ratio", "", ".3g"),
+        Column("verdict", "then"),
     )
 
 

@@ -21,24 +21,52 @@ PLANS = {
 NAMES = {plan.name: letter for letter, plan in PLANS.items()}
 
 
-def selected(letters, errors, scores=lambda error: Scores(np.full(2, error)), **options):
-    """Return the elements of the selected model, the trials as letters, and how often each model was fitted.
+class StandIn:
+    """Fits of models: the letters of their elements in their order, and the error.
 
-    ``errors``: of each model by its sorted letters; of others, that of the largest part of them.
+    ``errors``: of each model by its sorted letters; of others, that of the best part of them. ``local``: those of models where
+    they are fitted from a smaller one.
     """
-    fits: list[str] = []
 
-    def fit(before, plans):
-        fits.append("".join(sorted((before or "") + "".join(NAMES[plan.name] for plan in plans))))
-        return fits[-1]
+    def __init__(self, errors, local=None):
+        self._errors, self._local = errors, local or {}
+        self.fitted: list[str] = []
 
-    def score(model):
-        return scores(min(error for part, error in errors.items() if set(part) <= set(model)))
+    def more(self, before, plans):
+        model = (before[0] if before else "") + "".join(NAMES[plan.name] for plan in plans)
+        self.fitted.append(letters_of(model))
+        return model, self._local.get(letters_of(model), self._error(model))
 
-    found = select_elements([PLANS[letter] for letter in letters], fit, score, **options)
-    tried = ["".join(sorted(NAMES[name] for name in trial.elements)) for trial in found.trials]
-    assert tried == fits
-    return found.fit, found.trials, fits
+    def less(self, larger, position):
+        model = taken_out(larger, position)
+        self.fitted.append(letters_of(model))
+        return model, self._error(model)
+
+    def scores(self, fit):
+        return Scores(np.full(2, fit[1]))
+
+    def scores_without(self, larger, position):
+        return Scores(np.full(2, self._error(taken_out(larger, position))))
+
+    def _error(self, model):
+        return min(error for part, error in self._errors.items() if set(part) <= set(model))
+
+
+def letters_of(model):
+    return "".join(sorted(model))
+
+
+def taken_out(larger, position):
+    return larger[0][:position] + larger[0][position + 1 :]
+
+
+def selected(letters, errors, local=None, **options):
+    """Return the elements of the selected model, the trials, and what was fitted."""
+    fits = StandIn(errors, local)
+    found = select_elements([PLANS[letter] for letter in letters], fits, **options)
+    assert [letters_of(NAMES[name] for name in trial.elements) for trial in found.trials] == fits.fitted
+    assert tuple(PLANS[letter].name for letter in found.fit[0]) in [one.elements for one in found.trials if one.kept]
+    return letters_of(found.fit[0]), found.trials, fits.fitted
 
 
 def in_all_orders(letters, errors, **options):
@@ -72,8 +100,9 @@ def test_a_further_element_has_to_lower_errors_by_5_percent_however_few_records_
 def test_a_pair_is_found_that_pays_where_neither_of_it_pays_alone():
     found, trials, fits = in_all_orders("JST", {"": 1.0, "J": 0.5, "S": 0.9, "T": 0.9, "JST": 0.2})
     assert found == "JST"
-    assert fits[-2:] == ("JST", "ST")  # what was kept is tried to be left out
+    assert fits == ("J", "S", "T", "JS", "JT", "JST", "ST")  # what was kept is tried to be left out
     assert [trial.kept for trial in trials] == [True, False, False, False, False, True, False]
+    assert trials[-1].laws == ("jenkins",)
 
 
 def test_a_pair_has_to_lower_errors_twice():
@@ -91,6 +120,17 @@ def test_an_element_that_others_make_needless_is_left_out():
     assert trials[-1].kept
     assert trials[-1].gain == pytest.approx(0.1 / 0.101)
     assert in_all_orders("JSD", errors | {"JS": 0.11})[0] == "DJS"
+
+
+def test_a_needless_element_is_not_kept_because_the_fit_with_it_left_a_local_minimum():
+    """The fit of joint and spring ends at 0.3, that with a stop beside them at 0.1, and the stop does nothing."""
+    errors = {"": 1.0, "J": 0.5, "S": 0.6, "T": 0.9, "JS": 0.1}
+    found, trials, fits = in_all_orders("JST", errors, local={"JS": 0.3})
+    assert found == "JS"
+    assert fits == ("J", "S", "T", "JS", "JT", "JST", "ST", "JS")
+    assert trials[7].kept
+    assert trials[7].compared == tuple(PLANS[letter].name for letter in "JST")
+    assert (trials[7].laws, trials[7].error) == (("stop",), pytest.approx(0.1))
 
 
 def test_equal_elements_are_told_apart_by_their_number_only():
@@ -146,16 +186,18 @@ def test_a_gain_that_noise_may_have_made_does_not_count():
 
 
 def test_an_element_that_cannot_be_fitted_does_not_pay_and_where_none_can_the_reason_is_told():
-    def fit(before, plans):
-        if PLANS["J"] in plans:
-            raise IdentificationError("no joint")
-        return plans[0].name
+    class NoJoint(StandIn):
+        def more(self, before, plans):
+            if PLANS["J"] in plans:
+                raise IdentificationError("no joint")
+            return super().more(before, plans)
 
-    def score(_):
-        return Scores(np.array([0.5]))
-
-    found = select_elements([PLANS["J"], PLANS["S"]], fit, score)
-    assert found.fit == PLANS["S"].name
-    assert found.trials[0].error == np.inf
+    fits = NoJoint({"": 1.0, "S": 0.5})
+    found = select_elements([PLANS["J"], PLANS["S"]], fits)
+    assert found.fit == ("S", 0.5)
+    assert [trial.error for trial in found.trials] == [np.inf, 0.5, np.inf]
+    for plans in (["J"], ["J", "J"]):
+        with pytest.raises(IdentificationError, match="no joint"):
+            select_elements([PLANS[letter] for letter in plans], fits)
     with pytest.raises(IdentificationError, match="no joint"):
-        select_elements([PLANS["J"]], fit, score)
+        select_elements([PLANS["J"], PLANS["S"]], fits, selective=False)
