@@ -141,12 +141,12 @@ class Scores(NamedTuple):
 
     def gain_at_least(self, other: "Scores") -> float:
         """Return the lower limit of `gain_over`, 95 % sure by Student's t over experiments; NaN with fewer than two."""
-        from scipy.stats import t  # only on use: it takes long to load
+        from scipy.special import stdtrit  # only on use: it takes long to load
 
         if self.errors.size < 2 or not np.all(np.isfinite(self.errors)):
             return math.nan
         ratio = np.log(other.errors / self.errors)
-        half = t.ppf(_SURE, ratio.size - 1) * np.std(ratio, ddof=1) / np.sqrt(ratio.size)
+        half = stdtrit(ratio.size - 1, _SURE) * np.std(ratio, ddof=1) / np.sqrt(ratio.size)
         return float(np.exp(np.mean(ratio) - half))
 
     def likelihood_over(self, smaller: "Scores") -> float:

@@ -155,7 +155,7 @@ def fit_structured(
     IdentificationError.unless_at_least("steps", steps, 1)
     wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
     linear = linear_start(modes, first, steps)
-    names = tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments))
+    linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
     known = 0.0 if isinstance(support, bool) else float(support)
     if not 0.0 <= known < math.inf:
@@ -166,7 +166,7 @@ def fit_structured(
         modes,
         experiments,
         validation,
-        replace(linear, training=names, support_largest_n=largest, support_n_m=known),
+        replace(linear, support_largest_n=largest, support_n_m=known),
         reach=reach,
         support=support is True,
         alone=len(wanted) == 1,

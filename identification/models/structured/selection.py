@@ -9,7 +9,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.models.structured.element_trials import ElementPlan, ElementTrial, Scores
+from identification.models.structured.element_trials import LEAST_GAIN, ElementPlan, ElementTrial, Scores
 
 T = TypeVar("T")
 
@@ -67,9 +67,9 @@ def select_elements(plans: Sequence[ElementPlan], fits: Fits[T], selective: bool
     best pair is kept if it pays; otherwise the search ends. After each addition elements are left out in turn, as long as the
     model with them does not pay over the one without; they do not come back.
 
-    What is left out is fitted if it was not yet, or if its fit has larger errors than the larger model with the element taken
-    out and nothing fitted again: then that fit ended in a local minimum, which an addition has left, needed or not. Other
-    models that were fitted before were worse than those that were kept.
+    The model without an element is fitted if it was not yet, or if its fit has errors 5 % above those of the larger model with
+    the element taken out and nothing fitted again: then that fit ended in a local minimum, which an addition has left, needed
+    or not. Other models that were fitted before were worse than those that were kept.
 
     Of n elements the rounds take n (n + 1) / 2 fits, more if a pair pays; after each addition to k elements up to k - 2 are
     fitted to leave one out, more after local minima. A model is fitted from the best fit that has an element less, if there
@@ -102,12 +102,7 @@ _UNFITTED = Scores(np.array([np.inf]))
 
 
 class _Search(Generic[T]):
-    def __init__(
-        self,
-        plans: Sequence[ElementPlan],
-        fits: Fits[T],
-        selective: bool,
-    ) -> None:
+    def __init__(self, plans: Sequence[ElementPlan], fits: Fits[T], selective: bool) -> None:
         self._fits, self._selective = fits, selective
         named = {_key(plan): plan for plan in plans}
         keys = sorted(named)
@@ -152,14 +147,19 @@ class _Search(Generic[T]):
         return kept
 
     def _tried_without(self, larger: _Tried[T], position: int) -> _Tried[T] | None:
-        """Fit the model without an element; None if it was fitted before, to smaller errors than it has now."""
-        assert larger.fit is not None
+        """Fit the model without an element; None if it was fitted before, to errors hardly above those that it has now."""
+        fit = larger.fit
+        assert fit is not None
         order = (*larger.order[:position], *larger.order[position + 1 :])
         elements = tuple(sorted(order))
-        before = self._known.get(elements) or self._largest_part(elements)
-        if before is not None and self._fits.scores_without(larger.fit, position).size >= before.scores.size:
-            return None if before.elements == elements else self._tried(elements)
-        found = self._known[elements] = self._attempt(order, lambda: self._fits.less(larger.fit, position))
+        known = self._known.get(elements)
+        before = known or self._largest_part(elements)
+        if before is not None:
+            now = self._fits.scores_without(fit, position)
+            if now.gain_over(before.scores) < LEAST_GAIN:
+                return None if before is known else self._tried(elements)
+        found = self._attempt(order, lambda: self._fits.less(fit, position))
+        self._known[elements] = found if known is None or found.scores.size < known.scores.size else known
         return found
 
     def _pays(self, larger: _Tried[T], smaller: _Tried[T], count: int) -> bool:

@@ -7,7 +7,12 @@ import pytest
 
 from identification import Channel, Experiment, IdentificationError
 from identification.experiments.noise import mean_covariance
-from identification.experiments.residuals import residual_over_noise
+from identification.experiments.residuals import (
+    ResidualAndNoise,
+    log_likelihood_ratio,
+    residual_and_noise,
+    residual_over_noise,
+)
 from tests.refused import refused
 
 SIZE, PERIODS, RATE_HZ = 1000, 6, 500.0
@@ -72,6 +77,45 @@ def test_a_wrong_gain_gives_what_it_misses_over_the_noise():
     expected = 0.01 * np.sqrt(lines / noise)
     assert np.all(expected > 5.0)
     np.testing.assert_allclose(residual_over_noise(one, _simulated(one, 1.01)), expected, rtol=0.15)
+
+
+def _likelihood_ratio(smaller, larger, records):
+    """Log-likelihood ratio of models with these gains, on all records."""
+    parts = [
+        ResidualAndNoise(
+            *map(np.array, zip(*(residual_and_noise(one, _simulated(one, gain)) for one in records), strict=True))
+        )
+        for gain in (smaller, larger)
+    ]
+    return log_likelihood_ratio(*parts)
+
+
+def test_the_likelihood_ratio_is_the_power_of_what_a_model_misses_over_the_noise_and_adds_up_over_records():
+    """Of white noise in all lines; scatter known from 6 periods makes lines fewer by 1 + 1/5, the mean square of chi-square."""
+    random = np.random.default_rng(6)
+    records = [_experiment(_periods(random, outputs=0.05)) for _ in range(3)]
+    missed = 0.01**2 * np.sum(np.abs(RESPONSE[:, LINES]) ** 2 * 4.0, axis=1) / (4.0 * 0.05**2 / (SIZE * PERIODS))
+    expected = 3.0 * np.mean(missed) / 1.2
+    assert expected > 100.0
+    assert _likelihood_ratio(1.01, 1.0, records) == pytest.approx(expected, rel=0.1)
+    assert _likelihood_ratio(1.0, 1.0, records) == 0.0
+
+
+def test_noise_alone_rarely_makes_another_model_twenty_times_more_likely():
+    """At the difference of the models at which it does so most often, ``2 (1 - Phi(sqrt(2 log 20)))`` or less of the time."""
+    random = np.random.default_rng(8)
+    missed = np.sum(np.abs(RESPONSE[:, LINES]) ** 2 * 4.0, axis=1).mean() / (4.0 * 0.05**2 / (SIZE * PERIODS))
+    gain = 1.0 + np.sqrt(np.log(20.0) / missed)
+    found = [_likelihood_ratio(1.0, gain, [_experiment(_periods(random, outputs=0.05))]) for _ in range(60)]
+    assert np.count_nonzero(np.array(found) > np.log(20.0)) <= 3
+    assert np.mean(found) < 0.0  # the smaller model is right
+
+
+def test_where_no_record_shows_the_noise_there_is_no_likelihood_ratio():
+    one = _experiment(_periods(np.random.default_rng(7), outputs=0.05))
+    unknown = replace(one, noise_covariance=None)
+    assert np.isnan(_likelihood_ratio(1.01, 1.0, [unknown]))
+    assert _likelihood_ratio(1.01, 1.0, [unknown, one]) == _likelihood_ratio(1.01, 1.0, [one])
 
 
 def test_errors_of_the_steps_count_as_noise():
