@@ -29,7 +29,7 @@ class StructuredOptions(FitDataOptions):
     modes: Path | None = None
     """Linear model with which the fit begins; required."""
     laws: Annotated[tuple[str, ...], Option(metavar="LIST", default="polynomial-spring,polynomial-damper")] = ()
-    """Laws of an element, with @OUTPUT or @OUTPUT:OUTPUT where it acts; repeated for further elements in any order, kept if they pay."""
+    """Laws of an element, with @OUTPUT or @OUTPUT:OUTPUT where it acts; repeated for further elements, kept if they pay."""
     suspension_stiffness_n_m: Annotated[float | None, Option(metavar="N_PER_M", default="fitted")] = Field(None, ge=0.0)
     """Stiffness of the exciter's suspension, as in `rig show EXCITER`; 0 for none."""
 

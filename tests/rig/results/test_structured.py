@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import rig
-from identification import NonlinearElement
+from identification import ElementTrial, NonlinearElement
 from identification.models import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpring
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
@@ -103,6 +103,34 @@ def test_errors_of_modes_that_no_law_moves_are_those_of_the_fit(there, recording
         of_frequency, of_damping = (errors.get(f"{name} {index}", 0.0) for name in ("frequency", "damping"))
         assert mode["frequency_std_hz"] == pytest.approx(of_frequency * mode["frequency_hz"], rel=1e-2, abs=1e-9)
         assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-2, abs=1e-12)
+
+
+def test_models_that_a_selection_fitted_are_listed_in_their_order(there, recordings):
+    found = load(recordings / "S.h5")
+    of = {"laws": ("jenkins",), "between": (), "at_least": 2.0}
+    trials = (
+        ElementTrial(**of, elements=("stop@drive",), error=0.4, gain=np.nan, kept=False),
+        ElementTrial(**of, elements=("jenkins",), error=0.05, gain=np.nan, kept=True),
+        ElementTrial(
+            **of,
+            elements=("jenkins", "stop@drive"),
+            compared=("jenkins",),
+            error=0.0125,
+            gain=4.0,
+            likelihood=12.5,
+            kept=True,
+        ),
+    )
+    save(replace(found, fit=replace(found.fit, trials=trials)), recordings / "selected.h5")
+    assert load(recordings / "selected.h5").fit.trials[2] == trials[2]
+    said = there("show selected.h5").out.splitlines()
+    at = said.index("models that were fitted, 3, by the elements that they have")
+    assert [line.split() for line in said[at + 2 : at + 5]] == [
+        ["stop@drive", "40", "-", "-", "-", "-"],
+        ["jenkins", "5", "-", "-", "-", "kept"],
+        ["jenkins", "+", "stop@drive", "1.25", "4", "jenkins", "12.5", "kept"],
+    ]
+    assert "models that were fitted" not in there("show S.h5").out  # one alone is no selection
 
 
 def test_numbers_that_the_data_do_not_tell_are_said_to_be_not_identified(there, recordings):
