@@ -119,8 +119,8 @@ def fit_structured(
         Laws of the element (`laws`): what they declare as linear and as tried gets initial values
         from the data.
     elements
-        Elements in place of the one with ``laws``; their order does not matter. With n of them about n (n + 1) / 2 models are
-        fitted, each with all its numbers (`trials` of the result).
+        Elements in place of the one with ``laws``; their order does not matter. With n of them n (n + 1) / 2 to n^2 models
+        are usually fitted, each with all its numbers (`trials` of the result).
     validation
         Data that say which elements are kept (`ElementTrial`): forward, with a backward look, and in pairs where none pays
         alone. Without them all are kept.

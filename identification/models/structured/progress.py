@@ -13,9 +13,9 @@ _LEAST, _MOST = 30.0, 120.0
 
 
 class FitWatch:
-    """Calls ``progress`` after every linearisation of about so many fits, ``iterations`` at most in a stage."""
+    """Calls ``progress`` after every linearisation of so many fits, least and most, ``iterations`` at most in a stage."""
 
-    def __init__(self, progress: Callable[[FitProgress], None] | None, fits: int, iterations: int) -> None:
+    def __init__(self, progress: Callable[[FitProgress], None] | None, fits: tuple[int, int], iterations: int) -> None:
         self._progress, self._fits, self._iterations = progress, fits, iterations
         self._fit = 0
         self._began_s = time.perf_counter()
@@ -27,7 +27,8 @@ class FitWatch:
 
     def begin(self, stage: str) -> None:
         """Note that a stage begins."""
-        fit = f"fit {self._fit} of about {self._fits}, " if self._fits > 1 else ""
+        least, most = self._fits
+        fit = f"fit {self._fit} of {least} to {most}, " if most > 1 else ""
         self._stage, self._iteration = fit + stage, 0
 
     def linearised(self, error: float, took_s: float) -> None:
@@ -44,7 +45,7 @@ class FitWatch:
                     damping=math.nan,
                     seconds=time.perf_counter() - self._began_s,
                     stage=self._stage,
-                    usual_s=(_LEAST * self._fits * took_s, _MOST * self._fits * took_s) if timed else None,
+                    usual_s=(_LEAST * self._fits[0] * took_s, _MOST * self._fits[1] * took_s) if timed else None,
                 )
             )
         self._iteration += 1

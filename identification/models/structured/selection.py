@@ -20,9 +20,9 @@ _AT_A_TIME = (1, 2)
 """Elements that are added at a time: one, or two where none pays alone."""
 
 
-def usual_fits(plans: int) -> int:
-    """Return the number of fits of a selection that leaves nothing out later: n (n + 1) / 2."""
-    return plans * (plans + 1) // 2
+def usual_fits(plans: int) -> tuple[int, int]:
+    """Return how many fits a selection among n elements usually takes: n (n + 1) / 2 without a backward look, to n^2."""
+    return plans * (plans + 1) // 2, plans**2
 
 
 class Fits(Protocol[T]):

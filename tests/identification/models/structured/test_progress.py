@@ -7,9 +7,9 @@ from identification.models.structured.progress import FitWatch
 
 
 def told(took_s):
-    """Return what is told after linearisations of two fits that took so long, s."""
+    """Return what is told after linearisations of two or three fits that took so long, s."""
     seen: list[FitProgress] = []
-    watch = FitWatch(seen.append, fits=2, iterations=100)
+    watch = FitWatch(seen.append, fits=(2, 3), iterations=100)
     watch.begin("stage 1 of 4")
     for seconds in took_s:
         watch.linearised(0.5, seconds)
@@ -17,13 +17,13 @@ def told(took_s):
 
 
 def test_the_usual_time_follows_from_the_second_linearisation_alone():
-    assert [at.usual_s for at in told([9.0, 0.1, 7.0])] == [None, pytest.approx((6.0, 24.0)), None]
-    assert [at.usual_s for at in told([9.0, 1.0])] == [None, pytest.approx((60.0, 240.0))]
+    assert [at.usual_s for at in told([9.0, 0.1, 7.0])] == [None, pytest.approx((6.0, 36.0)), None]
+    assert [at.usual_s for at in told([9.0, 1.0])] == [None, pytest.approx((60.0, 360.0))]
 
 
 def test_iterations_are_counted_by_stage():
     seen: list[FitProgress] = []
-    watch = FitWatch(seen.append, fits=1, iterations=100)
+    watch = FitWatch(seen.append, fits=(1, 1), iterations=100)
     for stage in ("stage 1 of 2", "stage 2 of 2"):
         watch.begin(stage)
         watch.linearised(0.5, 1.0)
@@ -38,9 +38,9 @@ def test_iterations_are_counted_by_stage():
 
 def test_of_several_fits_the_stage_says_which():
     seen: list[FitProgress] = []
-    watch = FitWatch(seen.append, fits=3, iterations=100)
+    watch = FitWatch(seen.append, fits=(3, 4), iterations=100)
     for _ in range(2):
         watch.begin_fit()
         watch.begin("stage 1 of 4")
         watch.linearised(0.5, 1.0)
-    assert [at.stage for at in seen] == ["fit 1 of about 3, stage 1 of 4", "fit 2 of about 3, stage 1 of 4"]
+    assert [at.stage for at in seen] == ["fit 1 of 3 to 4, stage 1 of 4", "fit 2 of 3 to 4, stage 1 of 4"]
