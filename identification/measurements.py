@@ -43,9 +43,9 @@ class PeriodicVibration:
     harmonics_std
         float[n_channels, H + 1], standard error of the real part, equal to that of the imaginary part; None if unknown.
     rounding_std
-        complex[n_channels, H + 1], the part of ``harmonics_std`` that is due to the steps of the converter and would be the
-        same in a further run: standard error in phase with the coefficient (real) and in quadrature (imaginary); None if
-        unknown.
+        complex[n_channels, H + 1], the part of ``harmonics_std`` that would be the same in a further run, due to the steps of
+        the converter and images of the held output: standard error in phase with the coefficient (real) and in quadrature
+        (imaginary); None if unknown.
     drift
         complex[n_channels], change of the fundamental over the periods used, relative to the fundamental: the real part is
         that of the amplitude, the imaginary part that of the phase in rad; None if unknown.

@@ -30,6 +30,7 @@ __all__ = [
     "Adjustable",
     "Capabilities",
     "Channel",
+    "Image",
     "Role",
     "State",
     "flag_names",
@@ -93,6 +94,17 @@ class Adjustable(NamedTuple):
     """Longest period, samples, with which the device goes on where outputs come too late; 0 if it holds the last one."""
     buffered_blocks: int = 0
     """Blocks of outputs that lie ahead in the device's buffer besides the queue, with the bench's block."""
+
+
+class Image(NamedTuple):
+    """Error of the force reading near a resonance by images of the held output, which sampling folds back onto it."""
+
+    frequency_hz: float
+    """Frequency of the resonance, Hz."""
+    in_phase_n_per_v: float
+    """Part in phase with the force at phase resonance, per V of the output's amplitude, N/V; it is taken for damping."""
+    ahead_n_per_v: float
+    """Part a quarter period ahead of it, N/V; it shifts the frequency."""
 
 
 class State(Enum):
@@ -243,6 +255,11 @@ class DAQ(ABC):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Warnings of the driver about the bench, one line each; a run prints and records them."""
+        return ()
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """Images of the held output in the force reading, by resonance; empty where filters keep them out or none are known."""
         return ()
 
     @property

@@ -36,6 +36,8 @@ class Campaign:
     watch: Callable[..., tuple[Point[object], str]] | None = None
     """``(plan, points so far, point) -> (point, why to stop)``: completes a new point with the help of the points before it. If
     the text is not empty, the output is ramped down and the run ends."""
+    asks_for_damping: bool = False
+    """Whether its points are data for damping at phase resonance, so that what falsifies it refuses them."""
     identity: tuple[str, ...] = ()
     """Keys of a plan that define its vibrations. If one of them changes, no recorded point counts for the new plan."""
     fixed: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from rig.daq import DAQ
+from rig.daq import DAQ, Image
 from rig.loop.driven_loop import DrivenLoop
 from rig.text.json_values import JsonObject
 from rig.tick.layout import TickArrays
@@ -127,6 +127,11 @@ class Loop(DrivenLoop):
     def lateness_us(self) -> tuple[float, float, float, float]:
         """Response times so far, us: p50, p99, p99.9 and the largest; NaN, for this loop counts late chunks alone."""
         return (math.nan,) * 4
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """Images of the held output in the force reading, as the driver knows them."""
+        return self.daq.images
 
     @property
     def remarks(self) -> tuple[str, ...]:

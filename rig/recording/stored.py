@@ -33,6 +33,7 @@ class About(TypedDict, total=False):
     code: list[dict[str, str]]
     queue: StoredTable
     lead_samples: float
+    images: list[list[float]]
 
 
 class Information(TypedDict, total=False):

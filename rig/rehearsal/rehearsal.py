@@ -159,7 +159,8 @@ class RehearsalRequest:
         try:
             twin = self.twin(number)
             unknowns = twin.unknowns
-            trial = run_trial(self.plan, twin.bench, twin.number)
+            known = self.bench.driver.name == "virtual"  # of a real device no filters are known
+            trial = run_trial(self.plan, twin.bench, twin.number, images_known=known)
         except (OSError, MemoryError):  # of the machine, not of the twin
             raise
         except Exception as error:  # whatever a drawn rig does to the numbers

@@ -178,11 +178,12 @@ class _MemoryJournal:
         self.ended = end
 
 
-def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
+def run_trial(plan: Plan, bench: Bench, seed: int = 0, *, images_known: bool = True) -> Trial:
     """Run a plan on a virtual bench and return how it ended. Nothing is written to a disk.
 
     A plan that the bench refuses is a result too, with ``end`` = ``REFUSED``. What a plan knows of its plant at the force's
-    harmonics is left out, for a twin is like the rig near its mode only: the loop measures it by its step.
+    harmonics is left out, for a twin is like the rig near its mode only: the loop measures it by its step. ``images_known``:
+    points are judged by the images of the held output, as where the driver knows them.
     """
     plan = _without_harmonic_plant(plan)
     try:
@@ -191,7 +192,7 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
         return Trial(end=REFUSED, text=str(error), duration_s=0.0)
     journal, samples, before = _MemoryJournal(), 0, MeasuredBefore()
     for number in count():
-        execution, more = _part(plan, bench, seed + number * FURTHER_PART, journal, before)
+        execution, more = _part(plan, bench, seed + number * FURTHER_PART, journal, before, images_known)
         samples += more
         if not execution.to_repeat:
             break
@@ -208,7 +209,7 @@ def _without_harmonic_plant(plan: Plan) -> Plan:
 
 
 def _part(
-    plan: Plan, bench: Bench, seed: int, journal: _MemoryJournal, before: MeasuredBefore
+    plan: Plan, bench: Bench, seed: int, journal: _MemoryJournal, before: MeasuredBefore, images_known: bool
 ) -> tuple[Execution, int]:
     """Run what ``before`` has left of a plan; return its execution and the number of samples."""
     with open_session(bench, seed) as session:
@@ -216,7 +217,8 @@ def _part(
         settings = tick_settings(plan, bench, segments)
         loop = session.start(settings)
         journal.peaks = journal.peaks or _Peaks(bench, loop.tick.arrays.limits)
-        execution = Execution(plan, bench, loop, journal, Silent(), before)
+        images = loop.images if images_known else ()
+        execution = Execution(plan, bench, loop, journal, Silent(), before, images=images)
         execution.run({})
         return execution, loop.statistics.samples
 

@@ -9,6 +9,8 @@ change of R to R' is taken for a change of the damping ratio by ``Im(R' - R)/Im(
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from simulators.analysis.frequency_responses import frequency_response
 from simulators.virtual_rig import VirtualRig
 
@@ -19,6 +21,9 @@ class ImageBias:
 
     damping: float
     frequency: float
+    force_n_per_v: complex
+    """Error of the force that amounts to this, per V of the output's amplitude, N/V: real in phase with the force at phase
+    resonance, imaginary ahead of it. It hardly depends on the force, which is large where the damping is."""
 
 
 def image_bias(rig: VirtualRig, near_hz: float, *, force: str, drive: str) -> ImageBias:
@@ -45,5 +50,12 @@ def image_bias(rig: VirtualRig, near_hz: float, *, force: str, drive: str) -> Im
         true.sensor_per_v[drive] / true.sensor_per_v[force]
     )
     stiffness = 1.0 / true.receptance_m_per_n[rig.stinger.at][0]
-    error = stiffness * (change[0] - 1.0) / stiffness.imag
-    return ImageBias(damping=float(error.imag), frequency=float(modes.damping_ratio[mode] * error.real))
+    wrong = stiffness * (change[0] - 1.0)
+    error = wrong / stiffness.imag
+    held = np.sinc(at_hz[0] / rig.converter.sample_rate_hz)
+    moved = held * abs(true.displacement_m_per_v[rig.stinger.at][0])
+    return ImageBias(
+        damping=float(error.imag),
+        frequency=float(modes.damping_ratio[mode] * error.real),
+        force_n_per_v=complex(-1j * wrong * moved),  # the force is a quarter period ahead of the displacement
+    )

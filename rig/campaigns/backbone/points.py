@@ -123,6 +123,7 @@ BACKBONE = Campaign(
     columns=BACKBONE_COLUMNS,
     draw="rig.campaigns.backbone.figure:draw",
     panels=("backbone", "history"),
+    asks_for_damping=True,
     identity=("controller.phase_lag_deg",),
     fixed=("harmonics",),
     measurements={Backbone: recorded_backbone},

@@ -258,6 +258,7 @@ CONTINUOUS_BACKBONE = Campaign(
     columns=CONTINUOUS_BACKBONE_COLUMNS,
     draw="rig.campaigns.continuous_backbone.figure:draw",
     figure_in=(9.0, 9.6),
+    asks_for_damping=True,
     identity=("controller.phase_lag_deg",),
     fixed=("harmonics",),
     measurements={Backbone: recorded_mean_backbone, ContinuousBackbone: recorded_continuous_backbones},

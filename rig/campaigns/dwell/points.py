@@ -197,6 +197,7 @@ DWELL = Campaign(
     watch=watch_drift,
     columns=DWELL_COLUMNS,
     draw="rig.campaigns.dwell.figure:draw",
+    asks_for_damping=True,
     identity=("controller.phase_lag_deg", "mean_s"),
     fixed=("harmonics", "mean_s"),
     measurements={DwellCourse: recorded_course},

@@ -83,8 +83,8 @@ class Spectrum:
     drift: NDArray[np.complex128] | None = field(metadata=PAIRS)
     """complex128[channel]: relative change of the fundamental over the record; None if the vibration was not steady."""
     rounding_std: NDArray[np.complex128] | None = field(default=None, metadata=PAIRS)
-    """complex128[channel, h]: the part of the standard errors that is due to the steps of the converter, in phase with the
-    harmonic and in quadrature; None if it was not computed."""
+    """complex128[channel, h]: the part of the standard errors that is due to the steps of the converter and to known images of
+    the held output, in phase with the harmonic and in quadrature; None if it was not computed."""
 
 
 @dataclass(frozen=True, kw_only=True)

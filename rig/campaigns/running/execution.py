@@ -14,6 +14,7 @@ from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
 from rig.campaigns.evaluation.heavy_damping import with_heavy_damping
+from rig.campaigns.evaluation.images import with_images
 from rig.campaigns.evaluation.measured_together import Passage, round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
@@ -32,7 +33,7 @@ from rig.campaigns.running.start_judgement import Start, StartJudgement
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
-from rig.daq import flag_names
+from rig.daq import Image, flag_names
 from rig.errors import RecordingError
 from rig.live.publisher import Live
 from rig.loop.loop import LoopStatistics
@@ -89,11 +90,12 @@ class Execution:
         folder: Path | None = None,
         live: Live | None = None,
         checked: CheckedScale | None = None,
+        images: Sequence[Image] = (),
     ) -> None:
         before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
         self.journal, self.progress, self.live = journal, progress, live or Live()
-        self.kind = KINDS[plan.kind]
+        self.kind, self.images = KINDS[plan.kind], images
         self.batched = self.kind.measure_batch is not None
         self.targets = plan.targets()
         self.measured_before = before.done | before.given_up
@@ -306,6 +308,7 @@ class Execution:
             point = with_heavy_damping(point)
             if refused_for_a_transient(point, bench, rows, faults, steady):
                 self.passing.add(point.number)
+            point = with_images(bench, point, self.images, damping=self.kind.asks_for_damping)
             out.append(replace(point, rows=where))
         return out
 

@@ -191,11 +191,22 @@ class _Run:
         folder = self.output.absolute().parent
         with _unless_empty(journal()) as writer, _started(session, settings, self.output) as loop:
             execution = Execution(
-                self.plan, self.bench, loop, writer, self.options.progress, before, folder, self.live, checked
+                self.plan,
+                self.bench,
+                loop,
+                writer,
+                self.options.progress,
+                before,
+                folder,
+                self.live,
+                checked,
+                loop.images,
             )
             delay = loop.tick.arrays.loop[0]  # samples from an output to the input that responds to it
             lead_samples = float(delay["delay_whole"]) + float(delay["delay_fraction"])
             about: About = {**information["about"], "lead_samples": lead_samples, "device": session.identity}
+            if loop.images:
+                about["images"] = [[*image] for image in loop.images]
             execution.run({**information, "about": about})
         return execution
 

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Callable, Iterator
-from typing import ClassVar, Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -10,20 +11,22 @@ from pydantic import Field, ValidationError
 from rig.bench import Bench
 from rig.bench.channels import SAME_SENSITIVITY
 from rig.bench.configuration import Configured, invalid, validated
-from rig.daq import DAQ, Capabilities
+from rig.daq import DAQ, Capabilities, Image
 from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, Outputs, PassingFaults, held_outputs
+from rig.drivers.virtual.images import image_biases, image_remarks
 from rig.drivers.virtual.kernels import Converters, Loopback, exchange_block, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from rig.tick.safety.kernels import is_over
 from simulators import VirtualRig
 from simulators.kernels import Flag, RigArrays
-from simulators.parts import LOWEST_INTERNAL_RATE_HZ
 from vibrolock.compiled import bound
 from vibrolock.one_thread import one_thread
 
+if TYPE_CHECKING:
+    from simulators.analysis import ImageBias
+
 FACT_TOLERANCE = 1e-3  # relative difference from the bench that is worth a remark; chosen: as facts are rounded
-IMAGE_TOLERANCE = 0.01  # relative change of the damping ratio that is worth a remark; chosen
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
 COUNTED = (*(str(flag.name).lower() for flag in Flag), *FAULT_FLAGS, "lost_samples")
 GROWTH = 1e-3  # a step; of a plant that does not grow there is rounding alone, far below
@@ -156,7 +159,7 @@ class VirtualDAQ(DAQ):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Where the bench's facts differ from what the virtual rig is made of."""
-        out = self._images()
+        out = image_remarks(self.rig, self._image_biases, self._specimen.linear_frequency_hz)
         delays = self.rig.channel_delays_samples
         for channel, sensor, delay in zip(self.channels[: delays.size], self.rig.sensors, delays, strict=True):
             said, has = channel.sensitivity_v_per_unit, sensor.sensitivity_v_per_unit
@@ -184,34 +187,15 @@ class VirtualDAQ(DAQ):
             )
         return tuple(out)
 
-    def _images(self) -> list[str]:
-        """What the images of the held output do, where no filter keeps them out of the readings."""
-        converter, modes = self.rig.converter, self.rig.linear_modes
-        names = {channel.role: channel.name for channel in reversed(self.channels)}
-        mode = modes.nearest(self._specimen.linear_frequency_hz)
-        sampled = modes.frequency_hz[mode] < 0.5 * self.sample_rate_hz and modes.damping_ratio[mode] > 0.0
-        if (
-            converter.anti_alias_hz
-            or converter.reconstruction_hz
-            or not sampled
-            or not {"force", "drive"} <= names.keys()
-        ):
-            return []
-        from simulators.analysis import image_bias  # a rig with filters is opened without it
+    @cached_property
+    def _image_biases(self) -> "dict[float, ImageBias]":
+        return image_biases(self.rig, self.channels)
 
-        cure = "the virtual device has no anti-alias filter (driver.options.converter: oversampling, anti_alias_hz)"
-        bias = image_bias(self.rig, self._specimen.linear_frequency_hz, force=names["force"], drive=names["drive"])
-        if abs(bias.damping) > IMAGE_TOLERANCE:
-            return [
-                f"images of the held output change the damping ratio of the linear mode by {100.0 * bias.damping:+.2g} % of "
-                f"itself, its frequency by {100.0 * bias.frequency:+.2g} %, which the standard errors do not include: {cure}"
-            ]
-        if self.sample_rate_hz < LOWEST_INTERNAL_RATE_HZ:
-            return [
-                f"sample_rate_hz = {self.sample_rate_hz:g}: the stairs of the held output alias into the readings below "
-                f"about {LOWEST_INTERNAL_RATE_HZ:g} Hz, for {cure}"
-            ]
-        return []
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """Images of the held output in the force, of every linear mode that is sampled, where no filter keeps them out."""
+        parts = ((hz, bias.force_n_per_v) for hz, bias in self._image_biases.items())
+        return tuple(Image(hz, part.real, part.imag) for hz, part in parts)
 
     @property
     def capabilities(self) -> Capabilities:

@@ -91,7 +91,7 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         tick = settings.build(daq.latency_samples)
         tick.arrays, state = packed(tick.arrays)
         loop = WallClockLoop(daq, tick, state, memory, facts, lambda: _asked(came, released))
-        facts.send(("started", daq.latency_samples, layout, daq.remarks, dict(daq.identity)))
+        facts.send(("started", daq.latency_samples, layout, daq.remarks, daq.images, dict(daq.identity)))
         try:
             loop.run()
         finally:

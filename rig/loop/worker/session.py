@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from rig.bench import Bench
-from rig.daq import Capabilities
+from rig.daq import Capabilities, Image
 from rig.errors import DaqError
 from rig.loop.driven_loop import end_by_driver
 from rig.loop.loop import LoopStatistics
@@ -41,13 +41,14 @@ class WorkerLoop:
         layout: Layout,
         counters: dict[str, int],
         remarks: tuple[str, ...],
+        images: tuple[Image, ...],
     ) -> None:
         bench = settings.bench
         self.tick = settings.build(latency_samples)
         self.tick.arrays, self._state = packed(self.tick.arrays)
         self.failure = None
         self.cause = ""
-        self.remarks = remarks
+        self.remarks, self.images = remarks, images
         self.counters = counters
         self.statistics = LoopStatistics(bench.sample_rate_hz)
         self.ended = False
@@ -193,8 +194,8 @@ class WorkerSession:
         if not self._settled:
             self.settle_queue()
         self._worker.send("start", settings, self._ring_s)
-        latency_samples, layout, remarks, self.identity = self._worker.receive("started")
-        self._loop = WorkerLoop(self._worker, settings, latency_samples, layout, self._counters, remarks)
+        latency_samples, layout, remarks, images, self.identity = self._worker.receive("started")
+        self._loop = WorkerLoop(self._worker, settings, latency_samples, layout, self._counters, remarks, images)
         return self._loop
 
     def __enter__(self) -> Self:

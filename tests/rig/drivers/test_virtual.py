@@ -41,6 +41,12 @@ def last_damping(bench: Bench) -> np.ndarray:
         return nonlinear_mode(run.backbone()).damping_ratio
 
 
+def measured(bench: Bench) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Points of a backbone, accepted or not, and what its part says of itself."""
+    with rig.run("magnet-beam/backbone", bench=bench) as run:
+        return list(run.recording.latest.values()), run.recording.parts[0].information["about"]
+
+
 def test_slow_bench_with_filters_reads_the_damping_of_a_fast_one() -> None:
     fast, slow = last_damping(bench_with()), last_damping(slow_bench(**SLOW_AND_FILTERED))
     assert slow == pytest.approx(fast, rel=2e-3)
@@ -51,12 +57,29 @@ def test_slow_bench_without_filters_reads_it_wrong_and_says_by_how_much() -> Non
     (remark,) = make_daq(bench).remarks
     said = re.search(r"change the damping ratio of the linear mode by ([+-]\d+) % .* anti_alias_hz", remark)
     assert said is not None
-    lowest = (last_damping(bench) / last_damping(bench_with()))[0]
-    assert 100.0 * (lowest - 1.0) == pytest.approx(float(said[1]), abs=1.0)
+    right, of_filtered = measured(bench_with())
+    wrong, of_unfiltered = measured(bench)
+    shares = [1.0 - one["damping_ratio"] / other["damping_ratio"] for one, other in zip(right, wrong, strict=True)]
+    assert 100.0 * (1.0 / (1.0 - shares[0]) - 1.0) == pytest.approx(float(said[1]), abs=1.0)
+    for share, point in zip(shares, wrong, strict=True):  # of nonlinear points too
+        refusal = re.match(
+            r"images of the held output are ([\d.]+) % of the damping, accepted up to 10", point["reason"]
+        )
+        assert refusal is not None
+        assert float(refusal[1]) == pytest.approx(100.0 * share, rel=0.02)
+    assert all(point["quality"] in ("good", "warned") for point in right)
+    assert "images" not in of_filtered
+    assert of_unfiltered["images"] == [[*image] for image in make_daq(bench).images]
+
+
+def test_images_of_every_linear_mode_are_known_without_filters_alone() -> None:
+    assert make_daq(bench_with()).images == make_daq(slow_bench(**SLOW_AND_FILTERED)).images == ()
+    images = make_daq(slow_bench(substeps=20)).images
+    assert [image.frequency_hz for image in images] == pytest.approx([24.37, 134.06, 380.94], abs=0.01)
 
 
 def test_slow_bench_without_filters_and_with_little_bias_still_says_that_the_output_aliases(monkeypatch) -> None:
-    monkeypatch.setattr("rig.drivers.virtual.driver.IMAGE_TOLERANCE", 1.0)
+    monkeypatch.setattr("rig.drivers.virtual.images.TOLERANCE", 1.0)
     (remark,) = make_daq(slow_bench(substeps=20)).remarks
     assert remark.startswith("sample_rate_hz = 800: the stairs of the held output alias")
     assert "anti_alias_hz" in remark

@@ -27,3 +27,7 @@ def test_the_bias_is_what_a_phase_resonance_test_of_the_rig_finds() -> None:
     assert abs(bias.damping) > 0.01
     assert damping / DAMPING_RATIO - 1.0 == pytest.approx(bias.damping, rel=0.03)
     assert found_hz / FREQUENCY_HZ - 1.0 == pytest.approx(bias.frequency, rel=0.03)
+    ahead = force / drive / abs(force / drive)
+    wrong = bias.force_n_per_v * 0.1 / abs(force)
+    assert wrong.real / ahead.imag == pytest.approx(1.0 - DAMPING_RATIO / damping, rel=0.03)
+    assert -damping * wrong.imag / ahead.imag == pytest.approx(bias.frequency, rel=0.03)

@@ -1,0 +1,51 @@
+"""What images of the held output do to the readings of a virtual rig whose converter has no filter."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from rig.daq import Channel
+from simulators import VirtualRig
+from simulators.parts import LOWEST_INTERNAL_RATE_HZ
+
+if TYPE_CHECKING:
+    from simulators.analysis import ImageBias
+
+TOLERANCE = 0.01  # relative change of the damping ratio that is worth a remark; chosen
+CURE = "the virtual device has no anti-alias filter (driver.options.converter: oversampling, anti_alias_hz)"
+
+
+def image_biases(rig: VirtualRig, channels: Sequence[Channel]) -> "dict[float, ImageBias]":
+    """Return the bias in every linear mode that is sampled, by its frequency in Hz; empty where a filter keeps images out."""
+    converter, modes = rig.converter, rig.linear_modes
+    names = {channel.role: channel.name for channel in reversed(channels)}
+    if converter.anti_alias_hz or converter.reconstruction_hz or not {"force", "drive"} <= names.keys():
+        return {}
+    from simulators.analysis import image_bias  # a rig with filters is opened without it
+
+    seen = (
+        (modes.frequency_hz < 0.5 * converter.sample_rate_hz) & (modes.damping_ratio > 0.0) & (modes.drive_shape > 0.0)
+    )
+    return {
+        hz: image_bias(rig, hz, force=names["force"], drive=names["drive"])
+        for mode, hz in enumerate(modes.frequency_hz.tolist())
+        if seen[mode] and modes.nearest(hz) == mode  # not a free motion
+    }
+
+
+def image_remarks(rig: VirtualRig, biases: "Mapping[float, ImageBias]", near_hz: float) -> list[str]:
+    """Return what is worth saying before a run about the mode next to a frequency (Hz)."""
+    modes = rig.linear_modes
+    bias = biases.get(float(modes.frequency_hz[modes.nearest(near_hz)]))
+    if bias is None:
+        return []
+    if abs(bias.damping) > TOLERANCE:
+        return [
+            f"images of the held output change the damping ratio of the linear mode by {100.0 * bias.damping:+.2g} % of "
+            f"itself, its frequency by {100.0 * bias.frequency:+.2g} %: {CURE}"
+        ]
+    if rig.converter.sample_rate_hz < LOWEST_INTERNAL_RATE_HZ:
+        return [
+            f"sample_rate_hz = {rig.converter.sample_rate_hz:g}: the stairs of the held output alias into the readings below "
+            f"about {LOWEST_INTERNAL_RATE_HZ:g} Hz, for {CURE}"
+        ]
+    return []
