@@ -176,34 +176,46 @@ def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_sai
         tune(bench, tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
-@pytest.mark.parametrize("unsuited", [1, 3])
-def test_a_rig_is_refused_only_after_a_test_at_other_levels(unsuited, monkeypatch, tmp_path):
-    bench, calls = bench_with(name="magnet-beam"), []
+@pytest.fixture
+def measured(magnet, monkeypatch):
+    """Levels that a tuning measures at; the test is that of the magnet beam, its first level 0.02 V RMS."""
+    levels = []
 
+    def measure(series, name, damping_of, level_rms_v=None, highest_hz=None):
+        levels.append(level_rms_v)
+        return replace(magnet.test, level_rms_v=level_rms_v or 0.02, share_of_limits=0.1, distortion=0.0)
+
+    monkeypatch.setattr("rig.tuning.tuning.measure", measure)
+    return levels
+
+
+@pytest.mark.parametrize("unsuited", [1, 2, 3])
+def test_a_rig_is_refused_only_after_a_test_at_other_levels(unsuited, magnet, measured, monkeypatch, tmp_path):
     def choose(*arguments):
-        calls.append(arguments)
-        if len(calls) <= unsuited:
+        if len(measured) <= unsuited:
             raise UnsuitedError("the loop is unstable")
         return choose_gains(*arguments)
 
     monkeypatch.setattr("rig.tuning.tuning.choose", choose)
     if unsuited == 3:
         with refused(TuningError, "no-gains-suit-the-plant-at-either"):
-            tune(bench, tmp_path / "test.h5")
+            tune(magnet.bench, tmp_path / "test.h5")
     else:
-        found = tune(bench, tmp_path / "test.h5")
-        assert any("no gains suit the plant as the multisine at" in note for note in found.notes)
-        assert found.plant.frequency_rad_s / (2 * math.pi) == pytest.approx(24.37, rel=0.01)
-    assert len(calls) == min(unsuited + 1, 3)
+        found = tune(magnet.bench, tmp_path / "test.h5")
+        first, then = "the multisine at 0.02 V RMS", f"the plant at {measured[-1]:g} V RMS"
+        assert f"no gains suit the plant as {first} shows it; those of this plan are for {then}" in found.notes
+        assert found.test.level_rms_v == measured[-1]
+    assert measured == [None, 0.04, 0.01][: unsuited + 1]
 
 
-def test_a_rig_is_refused_at_once_at_a_level_that_was_asked_for(monkeypatch, tmp_path):
+def test_a_rig_is_refused_at_once_at_a_level_that_was_asked_for(magnet, measured, monkeypatch, tmp_path):
     def choose(*_):
         raise UnsuitedError("the loop is unstable")
 
     monkeypatch.setattr("rig.tuning.tuning.choose", choose)
     with pytest.raises(UnsuitedError, match=r"^the loop is unstable$"):
-        tune(bench_with(name="magnet-beam"), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
+        tune(magnet.bench, tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
+    assert measured == [0.02]
 
 
 @pytest.mark.parametrize(
