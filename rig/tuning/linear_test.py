@@ -65,14 +65,10 @@ class LinearTest:
 
     @property
     def other_levels_v(self) -> tuple[float, ...]:
-        """Levels for a second test, V RMS: twice this one where limits allow, and half of it where noise does.
-
-        With more than `MAX_DISTORTION` half comes first.
-        """
-        up = OTHER * self.share_of_limits <= SEARCH.safe_share
+        """Levels for a second test, V RMS: twice this one where limits and distortion allow, half of it where noise does."""
+        up = OTHER * self.share_of_limits <= SEARCH.safe_share and self.distortion <= MAX_DISTORTION
         down = 1.0 / (1.0 + OTHER**2 * (1.0 / min(self.coherence) - 1.0)) >= MIN_COHERENCE
-        levels = [OTHER * self.level_rms_v] * up + [self.level_rms_v / OTHER] * down
-        return tuple(sorted(levels, reverse=self.distortion <= MAX_DISTORTION))
+        return (OTHER * self.level_rms_v,) * up + (self.level_rms_v / OTHER,) * down
 
 
 def measure(
