@@ -14,7 +14,7 @@ import pytest
 from hypothesis import settings
 from joblib.externals.loky import reusable_executor
 
-from tests.running import first_those_that_wait, keep_bytecode, use_memory_for_files, workers
+from tests.running import in_order, keep_bytecode, use_memory_for_files, workers
 from tests.sharing import shared_folder
 from tests.studies.installed import install_studies
 
@@ -51,7 +51,7 @@ def pytest_collection():
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items):
-    first_those_that_wait(items)
+    in_order(items)
 
 
 @pytest.fixture(scope="session", autouse=True)

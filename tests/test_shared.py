@@ -4,7 +4,7 @@ import multiprocessing
 import os
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
+from typing import NamedTuple
 
 import pytest
 
@@ -13,7 +13,7 @@ import tests.recorded as store
 from rig.recording.reader import Recording
 from tests.recorded import SHORT, changed, recorded, recorded_at, recorded_run
 from tests.refused import refused
-from tests.running import WAITING, first_those_that_wait
+from tests.running import WAITING, in_order
 from tests.sharing import made_once, shared_folder
 
 
@@ -105,11 +105,26 @@ def test_a_change_of_what_a_run_depends_on_is_another_state_of_the_code(code, fi
     assert (store.state_of_the_code.__wrapped__() != before) is counts
 
 
-def test_tests_that_wait_begin_and_all_others_stay_in_their_order():
-    names = ["tests/rig/show/test_a.py::x", "tests/firmware/test_b.py::x", "tests/controller/test_c.py::x"]
-    items = [SimpleNamespace(nodeid=name) for name in names]
-    first_those_that_wait(items)
-    assert [item.nodeid for item in items] == [names[1], names[0], names[2]]
+def test_tests_that_wait_begin_classes_stay_together_and_all_others_in_their_order():
+    names = [
+        "show/test_a.py::x",
+        "live/test_b.py::A::x",
+        "live/test_b.py::B::x",
+        "live/test_b.py::A::y",
+        "test_c.py::z",
+    ]
+    items = [_Item(f"tests/rig/{name}") for name in names]
+    in_order(items)
+    assert [item.nodeid.removeprefix("tests/rig/") for item in items] == [names[k] for k in (1, 3, 2, 0, 4)]
+
+
+class _Item(NamedTuple):
+    nodeid: str
+
+    def getparent(self, of):
+        assert of is pytest.Class
+        file, *within = self.nodeid.split("::")
+        return _Item(f"{file}::{within[0]}") if len(within) > 1 else None
 
 
 @pytest.mark.parametrize("place", WAITING)
