@@ -6,7 +6,6 @@ The matrix of formats and conventions stands in `docs/reference/exchange.md`; ev
 import json
 import re
 from pathlib import Path
-from pkgutil import resolve_name
 from tempfile import TemporaryDirectory
 
 import h5py
@@ -14,12 +13,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-import rig.exchange.mat
-import rig.exchange.reading
-import rig.exchange.sources
 from identification import TimeRecords
 from rig.errors import RigError
-from rig.exchange.process import _READERS
 from rig.exchange.reading import import_file
 from tests.refused import refused
 from tests.rig.exchange.time_data.convention_writers import (
@@ -57,19 +52,6 @@ PAGE = Path(__file__).parents[4] / "docs" / "reference" / "exchange.md"
 ENDINGS = {"MAT": ".mat", "CSV": ".csv", "HDF5": ".h5", "TDMS": ".tdms", "MDF 4": ".mf4", "SEP005": ".json"}
 ENDINGS |= {"NumPy": ".npz", "workbook": ".xlsx", "LabVIEW": ".lvm", "WAV": ".wav"}
 EXAMPLE = {"force": "lbf", "motion": "g", "time": "ms", "rate": 2048.0, "scale": 0.25, "offset": -1.5, "late": 4}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _in_this_process():
-    """Read files in this process: the children are tested elsewhere, and cost a second each."""
-
-    def read(reader: str, path: Path, what: str, returns: type, **options: object) -> object:
-        return resolve_name(_READERS[reader])(path, **options)
-
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (rig.exchange.mat, rig.exchange.reading, rig.exchange.sources):
-            patch.setattr(module, "read_in_child", read)
-        yield
 
 
 def mapping(of: Case, force_unit: str = "", more: str = "") -> str:

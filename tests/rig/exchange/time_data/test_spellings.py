@@ -1,7 +1,6 @@
 """Spellings of units of time, rates and factors; units of columns; other kinds of mappings, which line up nothing."""
 
 from pathlib import Path
-from pkgutil import resolve_name
 
 import numpy as np
 import openpyxl
@@ -10,16 +9,12 @@ import scipy.io
 import soundfile
 from nptdms import ChannelObject, TdmsWriter
 
-import rig.exchange.mat
-import rig.exchange.reading
-import rig.exchange.sources
 from identification import TimeRecords
 from rig.errors import RigError
 from rig.exchange.beside import facts_beside
 from rig.exchange.file_data import FileData
 from rig.exchange.foreign.arrays import read_workbook
 from rig.exchange.foreign.channels import read_wav
-from rig.exchange.process import _READERS
 from rig.exchange.proposal.contents import contents_of
 from rig.exchange.proposal.proposal import _proposal
 from rig.exchange.reading import import_file
@@ -34,16 +29,6 @@ channels = [
   { name = "a", role = "drive", unit = "m/s2", value = "d/a" },
 ]
 """
-
-
-@pytest.fixture(autouse=True)
-def _in_this_process(monkeypatch):
-    for module in (rig.exchange.mat, rig.exchange.reading, rig.exchange.sources):
-        monkeypatch.setattr(
-            module,
-            "read_in_child",
-            lambda reader, path, what, returns, **of: resolve_name(_READERS[reader])(path, **of),
-        )
 
 
 @pytest.mark.parametrize(
