@@ -46,7 +46,7 @@ Responses and errors of PNLSS models
     ErrorSpectra, output_stretch, OutputStretch, ErrorTable, identify_many, ModelJob, IdentifiedModel,
     realisation_combinations
 Structured models
-    fit_structured, StructuredModel, StructuredFit, NonlinearElement, ElementPlan, ElementTrial,
+    fit_structured, StructuredModel, StructuredFit, NonlinearElement, ElementPlan, ElementTrial, MissingForce,
     CoupledMotion, structured_mode, bound_of, Bound
 Changes from run to run
     fit_with_scatter, RunScatter, OutputBand
@@ -190,6 +190,7 @@ if TYPE_CHECKING:
     from identification.models.structured.element_trials import ElementPlan as ElementPlan, ElementTrial as ElementTrial
     from identification.models.structured.elements import NonlinearElement as NonlinearElement
     from identification.models.structured.fit import StructuredFit as StructuredFit, fit_structured as fit_structured
+    from identification.models.structured.missing import MissingForce as MissingForce
     from identification.models.structured.mode import structured_mode as structured_mode
     from identification.models.structured.model import StructuredModel as StructuredModel
     from identification.multisine.best_linear_approximation import (

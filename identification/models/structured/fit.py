@@ -15,6 +15,7 @@ from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan, ElementTrial
 from identification.models.structured.identified import FittedNumber, fitted_numbers
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
+from identification.models.structured.missing import MissingForce
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.parameters import Parameters
 from identification.models.structured.problem import EVALUATIONS
@@ -55,6 +56,8 @@ class StructuredFit(FitResult):
         All models that were fitted, in the order in which they were, with what their elements brought.
     steps_left
         Share of the errors of the simulation's steps that no change of the numbers makes up for; 1 if unknown.
+    missing
+        What would explain the residual where noise does not, from the largest share; empty where noise does or is unknown.
     unseen
         Names of free numbers on which the training data do not depend, or only together with others. The covariance has zeros
         there, or too little.
@@ -69,6 +72,7 @@ class StructuredFit(FitResult):
     trials: tuple[ElementTrial, ...] = ()
     steps_left: float = 1.0
     unseen: tuple[str, ...] = ()
+    missing: tuple[MissingForce, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -189,6 +193,7 @@ def fit_structured(
         message=kept.last.ending.message,
         trials=trials,
         steps_left=steps_left,
+        missing=fits.missing(kept),
         unseen=tuple(name for name, one in zip(kept.problem.parameters.names, unseen, strict=True) if one),
     )
 

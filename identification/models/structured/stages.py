@@ -15,6 +15,7 @@ from identification.fitting.levenberg_marquardt import Minimum
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan, Scores
+from identification.models.structured.missing import MissingForce, missing_forces
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
 from identification.models.structured.parameters import HIGHEST, Parameters
@@ -148,6 +149,10 @@ class ElementFits:
     def scores_without(self, larger: Fitted, position: int) -> Scores:
         """Return the errors on the validation data with an element taken out and nothing fitted again."""
         return Scores.of(_taken_out(larger.model, position), self._validation)
+
+    def missing(self, fit: Fitted) -> tuple[MissingForce, ...]:
+        """Return what would explain the residual on the training data; nothing where noise does, or is unknown."""
+        return missing_forces(fit.model, self._experiments, self._nudged) if fit.lacks_something() else ()
 
     def _counted(self, fitted: Fitted) -> Fitted:
         self.evaluations += fitted.evaluations

@@ -81,7 +81,7 @@ def element_starts(
     such as the slip of a joint, the least first: the regression does not always rank them as a fit does. Mean positions in
     balance beyond the largest RMS are not found. Raises `IdentificationError` if no experiment is periodic.
     """
-    periodic = _periodic(experiments)
+    periodic = periodic_of(experiments)
     coordinates = [modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
     sizes = [np.sqrt(np.mean(np.abs(q) ** 2, axis=1)) for q, _, _ in coordinates]
     mode = int(np.argmax(np.max(sizes, axis=0)))
@@ -105,7 +105,8 @@ def element_starts(
     return [with_regression(linear, one, [mode], reach, (direction, ())) for one in best.values()]
 
 
-def _periodic(experiments: Sequence[Experiment]) -> list[Experiment]:
+def periodic_of(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """Return the periodic ones; raise `IdentificationError` if there is none."""
     found = [experiment for experiment in experiments if experiment.period_samples]
     IdentificationError.raise_if(
         not found, "none is periodic", field="experiments", allowed="one at least for the initial values"
@@ -206,7 +207,7 @@ def with_further_element(
     along every mode, between any two of them, and at every output. Numbers in which a law is not linear are tried
     (`Law.tried`).
     """
-    parts = [_ModalMotion(model, one, measured_modes) for one in _periodic(experiments)]
+    parts = [ModalMotion(model, one, measured_modes) for one in periodic_of(experiments)]
     shapes = model.output_shapes[:, :measured_modes]
     directions = [model.output_selector(plan.between) @ shapes] if plan.between else _directions(shapes)
     found = [
@@ -234,7 +235,7 @@ def _directions(shapes: Float) -> list[Float]:
     return [np.asarray(size * one / np.max(np.abs(one))) for one in found if np.any(one)]
 
 
-class _ModalMotion:
+class ModalMotion:
     """Measured modal motion in one experiment, and the modal forces that the model leaves unexplained, weighted."""
 
     def __init__(self, model: StructuredModel, experiment: Experiment, modes: int) -> None:
@@ -261,7 +262,7 @@ class _ModalMotion:
         return np.asarray(np.ravel(self.weight * direction[:, None] * spectrum))
 
 
-def _regression_of_modes(parts: Sequence[_ModalMotion], direction: Float, laws: list[Law]) -> Regression:
+def _regression_of_modes(parts: Sequence[ModalMotion], direction: Float, laws: list[Law]) -> Regression:
     scale = max(float(np.max(np.abs(direction @ part.q))) for part in parts)
     basis = [one for law in laws for one in law.basis()]
     modes = np.eye(direction.size)

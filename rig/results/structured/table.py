@@ -17,6 +17,9 @@ from rig.text.console import number, print_rows
 _LEAST_SUPPORT_N_M = 1e-3
 """Stiffness of the support below which it counts as none."""
 
+_MISSING, _EXPLAINS = 4, 0.5
+"""Forces that are listed, and the share of the squared residual from which one is named. Chosen."""
+
 
 _Modes = list[dict[str, float | None]]
 _SAME = 1e-6
@@ -105,6 +108,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
             "stopped": fit.message,
             "seconds": fit.seconds,
             "trials": [asdict(trial) for trial in fit.trials],
+            "missing": [asdict(force) for force in fit.missing],
         },
         "notes": [*found.notes, *(f"names a function, {one}: simulations import it" for one in found.functions)],
     }
@@ -144,6 +148,7 @@ def _say(summary: dict[str, Any]) -> None:
         *(Column(str(i), f"direction {i + 1}", "", ".4f") for i in range(modes)),
     )
     _say_trials([] if summary["fit"] is None else summary["fit"]["trials"])
+    _say_missing([] if summary["fit"] is None else summary["fit"]["missing"])
     _say_numbers(summary)
     say_scatter(summary["scatter"])
     say_errors(summary)
@@ -191,6 +196,32 @@ def _say_trials(trials: list[dict[str, Any]]) -> None:
         Column("likelihood", "log-likelihood ratio", "", ".3g"),
         Column("verdict", "then"),
     )
+
+
+def _say_missing(missing: list[dict[str, Any]]) -> None:
+    """What would explain the residual: the model's own numbers, and the forces that explain most."""
+    if not missing:
+        return
+    told = [one for one in missing if one["place"]][:_MISSING]
+    numbers = [one for one in missing if not one["place"]]
+    print(f"what would explain the residual of the training data: {_missing(numbers, told)}")
+    print_rows(
+        [
+            one | {"force": "other values of the numbers" if not one["place"] else one["force"]}
+            for one in numbers + told
+        ],
+        Column("force", "force"),
+        Column("place", "at"),
+        Column("share", "share of the squared residual", "%", ".1f", 100.0),
+    )
+
+
+def _missing(numbers: list[dict[str, Any]], forces: list[dict[str, Any]]) -> str:
+    if any(one["share"] > _EXPLAINS for one in numbers):
+        return "other values of the model's own numbers, so that its fit ended in a local minimum"
+    if forces and forces[0]["share"] > _EXPLAINS:
+        return f"a {forces[0]['force']} at {forces[0]['place']}"
+    return "no spring, damper or joint at an output or along a mode"
 
 
 def _say_modes(modes: _Modes) -> None:

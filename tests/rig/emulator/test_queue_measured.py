@@ -98,7 +98,9 @@ def test_a_run_says_and_records_its_queue(emulator: Emulator) -> None:
 
 
 def test_a_multisine_gets_a_tenth_of_a_second(emulator: Emulator) -> None:
-    remarks, queue = run_on(emulator.bench, "magnet-beam/multisine-1", levels_rms_v=(0.05,), resolution_hz=1.0, realisations=1)
+    remarks, queue = run_on(
+        emulator.bench, "magnet-beam/multisine-1", levels_rms_v=(0.05,), resolution_hz=1.0, realisations=1
+    )
     assert (queue["how"], queue["blocks"]) == ("open loop", 10)
     assert "no output of this plan" in remarks[0]
 

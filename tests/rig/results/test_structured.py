@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import rig
-from identification import ElementTrial, NonlinearElement
+from identification import ElementTrial, MissingForce, NonlinearElement
 from identification.models import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpring
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
@@ -131,6 +131,32 @@ def test_models_that_a_selection_fitted_are_listed_in_their_order(there, recordi
         ["jenkins", "+", "stop@drive", "1.25", "4", "jenkins", "12.5", "kept"],
     ]
     assert "models that were fitted" not in there("show S.h5").out  # one alone is no selection
+
+
+@pytest.mark.parametrize(
+    ("numbers", "share", "said"),
+    [
+        (0.1, 0.9, "a joint at tip"),
+        (0.9, 0.2, "other values of the model's own numbers, so that its fit ended in a local minimum"),
+        (0.1, 0.4, "no spring, damper or joint at an output or along a mode"),
+    ],
+)
+def test_what_would_explain_the_residual_is_named(there, recordings, numbers, share, said):
+    found = load(recordings / "S.h5")
+    missing = (
+        MissingForce(force="numbers", place="", share=numbers),
+        MissingForce(force="joint", place="tip", share=share),
+        *(MissingForce(force="spring", place="drive", share=0.1 / k) for k in range(1, 6)),
+    )
+    save(replace(found, fit=replace(found.fit, missing=missing)), recordings / "lacking.h5")
+    assert load(recordings / "lacking.h5").fit.missing == missing
+    lines = there("show lacking.h5").out.splitlines()
+    at = lines.index(f"what would explain the residual of the training data: {said}")
+    assert [line.rsplit(maxsplit=2)[-2:] for line in lines[at + 3 : at + 7]] == [
+        ["tip", f"{100.0 * share:.1f}"],
+        *(["drive", f"{10.0 / k:.1f}"] for k in range(1, 4)),
+    ]
+    assert "what would explain" not in there("show S.h5").out
 
 
 def test_numbers_that_the_data_do_not_tell_are_said_to_be_not_identified(there, recordings):
