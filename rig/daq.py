@@ -107,6 +107,10 @@ class Image(NamedTuple):
     """Part a quarter period ahead of it, N/V; it shifts the frequency."""
 
 
+IMAGES_ACCEPTED = 0.1
+"""Share of the measured damping that images may have in a point of a test that asks for damping; chosen."""
+
+
 class State(Enum):
     """Life cycle of a driver."""
 

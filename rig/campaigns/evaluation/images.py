@@ -15,10 +15,10 @@ import numpy as np
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Modal, Point, Spectrum
 from rig.campaigns.evaluation.vibrations import channels_of, vibration_from
-from rig.daq import Image
+from rig.daq import IMAGES_ACCEPTED, Image
 
-TOLD, ACCEPTED = 0.01, 0.1
-"""Shares of the damping above which a point has a warning, and is no data for damping; chosen."""
+TOLD = 0.01
+"""Share of the damping above which a point has a warning; chosen."""
 
 
 def with_images(bench: Bench, point: Point[object], images: Sequence[Image], *, damping: bool) -> Point[object]:
@@ -77,10 +77,10 @@ def _judged(point: Point[object], share: float, *, damping: bool) -> Point[objec
     if not abs(share) > TOLD:
         return point
     said = f"{100.0 * share:.3g} % of the damping"
-    if damping and point.accepted and abs(share) > ACCEPTED:
+    if damping and point.accepted and abs(share) > IMAGES_ACCEPTED:
         return point.refused(
-            f"images of the held output are {said}, accepted up to {100.0 * ACCEPTED:g} %: an anti-alias filter ahead of the "
-            "inputs keeps them out"
+            f"images of the held output are {said}, accepted up to {100.0 * IMAGES_ACCEPTED:g} %: an anti-alias filter "
+            "ahead of the inputs keeps them out"
         )
     text = (
         f"images of the held output ({said}): they alias onto the force, no anti-alias filter keeps them out; the standard "

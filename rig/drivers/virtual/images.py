@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from rig.daq import Channel
+from rig.daq import IMAGES_ACCEPTED, Channel
 from simulators import VirtualRig
 from simulators.parts import LOWEST_INTERNAL_RATE_HZ
 
@@ -39,9 +39,12 @@ def image_remarks(rig: VirtualRig, biases: "Mapping[float, ImageBias]", near_hz:
     if bias is None:
         return []
     if abs(bias.damping) > TOLERANCE:
+        refused = abs(bias.damping) > IMAGES_ACCEPTED * abs(1.0 + bias.damping)  # points know their own damping alone
         return [
             f"images of the held output change the damping ratio of the linear mode by {100.0 * bias.damping:+.2g} % of "
-            f"itself, its frequency by {100.0 * bias.frequency:+.2g} %: {CURE}"
+            f"itself, its frequency by {100.0 * bias.frequency:+.2g} %"
+            + (f"; tests of damping refuse points with more than {100.0 * IMAGES_ACCEPTED:g} %" if refused else "")
+            + f": {CURE}"
         ]
     if rig.converter.sample_rate_hz < LOWEST_INTERNAL_RATE_HZ:
         return [

@@ -57,6 +57,7 @@ def test_slow_bench_without_filters_reads_it_wrong_and_says_by_how_much() -> Non
     (remark,) = make_daq(bench).remarks
     said = re.search(r"change the damping ratio of the linear mode by ([+-]\d+) % .* anti_alias_hz", remark)
     assert said is not None
+    assert "; tests of damping refuse points with more than 10 %: the virtual device has no" in remark
     right, of_filtered = measured(bench_with())
     wrong, of_unfiltered = measured(bench)
     shares = [1.0 - one["damping_ratio"] / other["damping_ratio"] for one, other in zip(right, wrong, strict=True)]
