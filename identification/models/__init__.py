@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from identification.models.structured.identified import FittedNumber as FittedNumber
     from identification.models.structured.laws import (
         LAWS as LAWS,
+        BoucWen as BoucWen,
         Damper as Damper,
         Iwan as Iwan,
         Jenkins as Jenkins,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
         Stop as Stop,
         UserSpring as UserSpring,
     )
+    from identification.models.structured.regression import law_force as law_force
     from identification.models.structured.start import linear_start as linear_start
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

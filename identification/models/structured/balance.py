@@ -16,11 +16,16 @@ from identification.harmonic_balance.basis import Basis, complex_product
 from identification.harmonic_balance.driven import DrivenBalance, Period
 from identification.harmonic_balance.drives import Drive
 from identification.harmonic_balance.stability import by_centroid, distinct
+from identification.models.structured.hysteresis import hysteresis_step
 from identification.models.structured.kernels import damping_at, jenkins_step, spring_at
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.steps import System
 from vibrolock.arrays import Complex, Float
 from vibrolock.compiled import inner_kernel, unlocked_kernel
+
+CLOSING = 12  # periods at most in which Newton's method closes a loop
+CLOSED = 1e-11  # what a loop misses when it is closed, relative to its largest force
+LOSSLESS = 1e-9  # share of a change of force that a period takes, below which a hysteresis is a spring
 
 
 class StructuredBalance(DrivenBalance):
@@ -43,6 +48,7 @@ class StructuredBalance(DrivenBalance):
         self._to_rate = basis.to_time @ self._turning
         shape = (self.ranges, basis.samples)
         self._work = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
+        self._rows = np.empty((2, basis.size))
 
     def like(self, model: StructuredModel) -> "StructuredBalance":
         """Return the same equations of another model."""
@@ -99,7 +105,7 @@ class StructuredBalance(DrivenBalance):
     def _elements(self, states: Float, w: float) -> tuple[Float, Float, Float]:
         along = states @ self._system.phi.T
         x, rate = (np.ascontiguousarray((to @ along).T) for to in (self.basis.to_time, w * self._to_rate))
-        along_period(self._system, x, rate, self.basis.to_time, w * self._to_rate, *self._work)
+        along_period(self._system, x, rate, self.basis.to_time, w * self._to_rate, self._rows, *self._work)
         return self._work
 
     def _support(self, displacement: Float, w: float) -> tuple[Float, Float, Float]:
@@ -204,6 +210,73 @@ def add_slider(
                         by[k, c] += stiffness * (to_time[k, c] - begin)
 
 
+@inner_kernel
+def period_of(
+    r: float,
+    last: float,
+    slider: np.ndarray,
+    bend: np.ndarray,
+    x: np.ndarray,
+    to_time: np.ndarray,
+    begin: int,
+    own: np.ndarray,
+) -> tuple[float, float]:
+    """Move a hysteresis through a period from the force ``r`` at the displacement ``last``.
+
+    That is the displacement of the last sample, or 0 if ``begin`` is 0. Return the force at the end and its derivative by
+    ``r``; ``own`` gets the derivatives of the end by the coefficients of x, those of ``r`` taken as what is in it at first.
+    """
+    total, previous = 1.0, x.size - 1
+    for k in range(x.size):
+        _, r, _, _, by_way, by_r = hysteresis_step(r, slider[0], slider[1], bend[0], bend[1], bend[2], x[k] - last)
+        total *= by_r
+        for c in range(own.size):
+            before = to_time[previous, c] if k + begin > 0 else 0.0
+            own[c] = by_r * own[c] + by_way * (to_time[k, c] - before)
+        last, previous = x[k], k
+    return r, total
+
+
+@inner_kernel
+def add_hysteresis(
+    slider: np.ndarray,
+    bend: np.ndarray,
+    x: np.ndarray,
+    to_time: np.ndarray,
+    rows: np.ndarray,
+    force: np.ndarray,
+    by: np.ndarray,
+) -> None:
+    """Add the force of a hysteresis whose loop is closed, and its derivatives.
+
+    A loop closes in many periods if it is small. The force with which a period ends as it has begun is therefore found by
+    Newton's method, from the end of a period that began at rest; a loop of which hardly anything is lost keeps that.
+    """
+    own, before = rows[0], rows[1]
+    own[:] = 0.0
+    last = x[x.size - 1]
+    r, kept = period_of(0.0, 0.0, slider, bend, x, to_time, 0, own)
+    for _ in range(CLOSING):
+        before[:] = 0.0
+        end, kept = period_of(r, last, slider, bend, x, to_time, 1, before)
+        if 1.0 - kept < LOSSLESS:
+            break
+        change = (end - r) / (1.0 - kept)
+        r += change
+        for c in range(own.size):
+            own[c] = before[c] / (1.0 - kept)
+        if abs(change) <= CLOSED * slider[1]:
+            break
+    previous = x.size - 1
+    for k in range(x.size):
+        _, r, _, _, by_way, by_r = hysteresis_step(r, slider[0], slider[1], bend[0], bend[1], bend[2], x[k] - last)
+        force[k] += r
+        for c in range(own.size):
+            own[c] = by_r * own[c] + by_way * (to_time[k, c] - to_time[previous, c])
+            by[k, c] += own[c]
+        last, previous = x[k], k
+
+
 @unlocked_kernel
 def along_period(
     system: System,
@@ -211,6 +284,7 @@ def along_period(
     rate: np.ndarray,
     to_time: np.ndarray,
     to_rate: np.ndarray,
+    rows: np.ndarray,
     force: np.ndarray,
     damping: np.ndarray,
     by: np.ndarray,
@@ -219,7 +293,7 @@ def along_period(
 
     ``x`` and ``rate``, float[n_elements, samples], are displacements and their derivatives by time, which ``to_time`` and
     ``to_rate``, float[samples, size], give from Fourier coefficients. ``by``, float[n_elements, samples, size]: derivatives
-    of the force by the coefficients of x.
+    of the force by the coefficients of x. ``rows``: work, float[2, size].
     """
     tables = system.tables
     for e in range(x.shape[0]):
@@ -231,4 +305,7 @@ def along_period(
             for c in range(to_time.shape[1]):
                 by[e, k, c] = slope * to_time[k, c] + damping[e, k] * to_rate[k, c]
         for s in range(tables.first[e], tables.first[e + 1]):
-            add_slider(tables.sliders[s, 0], tables.sliders[s, 1], x[e], to_time, force[e], by[e])
+            if tables.bends[s, 1] == 0.0:
+                add_slider(tables.sliders[s, 0], tables.sliders[s, 1], x[e], to_time, force[e], by[e])
+            else:
+                add_hysteresis(tables.sliders[s], tables.bends[s], x[e], to_time, rows, force[e], by[e])

@@ -194,7 +194,9 @@ def _with(
     f = float(system.omega.min())
     potential = stiffness + eps * damping + form(high)
     w_form = 0.5 * (1.0 + eps / f) * mean_square + 0.5 * to_q.T @ (potential + eps * f * eye) @ to_q
-    slider_energy = float(np.sum(tables.sliders[:, 1] ** 2 / np.maximum(2.0 * tables.sliders[:, 0], 1e-300)))
+    stored = tables.sliders[:, 1] ** 2 / np.maximum(2.0 * tables.sliders[:, 0], 1e-300)
+    # a hysteresis unloads with at least 2 k/(1 + gamma) if gamma is above 1, else with at least k
+    slider_energy = float(np.sum(stored * np.maximum(0.5 * (1.0 + tables.bends[:, 2]), 1.0)))
     fixed = 2.0 * (1.0 + eps / f) * float(sizes @ strength**2) + float(np.sum(above)) + slider_energy
     nu = 0.5 * (1.0 + eps / f) * rest * float(b @ b)
     factor = np.linalg.inv(np.linalg.cholesky(s_form))

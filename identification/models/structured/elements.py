@@ -113,6 +113,11 @@ class NonlinearElement:
         found = [law.sliders().T for law in laws if isinstance(law, Joint)]
         return np.concatenate([np.zeros((0, 2)), *found]) * self.scale_m
 
+    def bends(self, laws: Sequence[Law]) -> Float:
+        """float[n_sliders, 3]: yield force (J), exponent and ratio of the same; zeros for a Jenkins slider."""
+        found = [law.bends().T for law in laws if isinstance(law, Joint)]
+        return np.concatenate([np.zeros((0, 3)), *found]) * [self.scale_m, 1.0, 1.0]
+
 
 class Tables(NamedTuple):
     """What the kernels know of all elements."""
@@ -125,6 +130,8 @@ class Tables(NamedTuple):
     """float[n_elements, 3]: reach, and slopes of the springs below and above it."""
     sliders: np.ndarray
     """float[n_sliders, 2]: stiffness and largest force."""
+    bends: np.ndarray
+    """float[n_sliders, 3]: yield force, exponent and ratio of a hysteresis; zeros for a Jenkins slider."""
     first: np.ndarray
     """int[n_elements + 1]: first slider of every element."""
 
@@ -142,6 +149,8 @@ class DerivativeTables(NamedTuple):
     """float[P_dampers, NODES]."""
     sliders: np.ndarray
     """float[P_joints, n_sliders, 2]."""
+    bends: np.ndarray
+    """float[P_joints, n_sliders, 3]."""
     first: np.ndarray
     """int[P_joints]: first slider that a number changes."""
     last: np.ndarray
@@ -161,6 +170,7 @@ def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Fl
         dampers=np.array([element.damper(element.laws) for element in elements]).reshape(-1, NODES),
         limits=np.array(limits).reshape(-1, 3),
         sliders=np.concatenate([np.zeros((0, 2)), *sliders]),
+        bends=np.concatenate([np.zeros((0, 3)), *(element.bends(element.laws) for element in elements)]),
         first=np.cumsum([0, *map(len, sliders)]),
     )
 
@@ -182,7 +192,7 @@ def laws_in_order(elements: Sequence[NonlinearElement]) -> list[tuple[int, int]]
 
 def derivative_tables_of(elements: Sequence[NonlinearElement], tables: Tables) -> DerivativeTables:
     """Return the derivatives of `tables_of` by the numbers of the laws."""
-    owner, springs, limits, dampers, sliders = [], [], [], [], []
+    owner, springs, limits, dampers, joints = [], [], [], [], []
     for e, number in laws_in_order(elements):
         element, law = elements[e], elements[e].laws[number]
         begin = int(tables.first[e]) + sum(len(element.sliders([other])) for other in element.laws[:number])
@@ -200,21 +210,22 @@ def derivative_tables_of(elements: Sequence[NonlinearElement], tables: Tables) -
                     (element.damper([more]) - element.damper([law])) / _NUDGE
                 )  # linear; less may be below zero
             else:
-                change = np.zeros_like(tables.sliders)
                 way = float(more.vector[k] - less.vector[k])  # less may be at its bound
-                moved = (element.sliders([more]) - element.sliders([less])) / way
-                change[begin : begin + len(moved)] = moved
-                sliders.append(change)
-    by_slider = np.array(sliders).reshape(len(sliders), len(tables.sliders), 2)
+                rows = [np.hstack([element.sliders([one]), element.bends([one])]) for one in (more, less)]
+                change = np.zeros((len(tables.sliders), 5))
+                change[begin : begin + len(rows[0])] = (rows[0] - rows[1]) / way
+                joints.append(change)
+    by_slider = np.array(joints).reshape(len(joints), len(tables.sliders), 5)
     changed = np.any(by_slider != 0.0, axis=2)
     return DerivativeTables(
         element=np.array(owner, dtype=np.int64),
         springs=np.array(springs).reshape(-1, 3, NODES),
         limits=np.array(limits).reshape(-1, 3),
         dampers=np.array(dampers).reshape(-1, NODES),
-        sliders=by_slider,
-        first=np.argmax(changed, axis=1) if sliders else np.zeros(0, dtype=np.int64),
-        last=changed.shape[1] - np.argmax(changed[:, ::-1], axis=1) if sliders else np.zeros(0, dtype=np.int64),
+        sliders=np.ascontiguousarray(by_slider[..., :2]),
+        bends=np.ascontiguousarray(by_slider[..., 2:]),
+        first=np.argmax(changed, axis=1) if joints else np.zeros(0, dtype=np.int64),
+        last=changed.shape[1] - np.argmax(changed[:, ::-1], axis=1) if joints else np.zeros(0, dtype=np.int64),
     )
 
 

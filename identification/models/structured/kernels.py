@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from vibrolock.compiled import inner_kernel, unlocked_kernel
+from vibrolock.compiled import inner_kernel
 
 NEAR = 1e-3  # of the reach: over shorter ways the mean force is that of two Gauss points, which is exact to rounding
 GAUSS = 0.5 - 0.5 / math.sqrt(3.0)  # place of the first of two Gauss points on the unit interval
@@ -88,16 +88,3 @@ def step_force(
     mean, by_x, by_way = mean_spring(x, h * w, table, limits)
     damping, steep = damping_at(x + 0.5 * h * w, row, limits[0])
     return mean + damping * w, by_x + steep * w, h * by_way + damping + 0.5 * h * steep * w
-
-
-@unlocked_kernel
-def jenkins_forces(sliders: np.ndarray, x: np.ndarray, out: np.ndarray) -> None:
-    """Write the force of sliders [n, 2] in the second of two periods with the displacement ``x``."""
-    for s in range(sliders.shape[0]):
-        r, last = 0.0, x[x.size - 1]
-        for repeat in range(2):
-            for k in range(x.size):
-                r = jenkins_step(r, sliders[s, 0], sliders[s, 1], x[k] - last)[1]
-                last = x[k]
-                if repeat == 1:
-                    out[k] += r

@@ -21,6 +21,11 @@ from vibrolock.iwan import iwan_sliders
 
 _LARGEST_SLIP = 0.9
 """Largest slip x of a joint's sliders: one that the training data hardly reach is a spring to them, of any stiffness."""
+_LARGEST_ELASTIC = 30.0
+"""Largest force of a hysteresis that hardens, as the displacement x at which the stiffness at rest would reach it. Chosen, far
+beyond the data: the bound of the motion needs one."""
+_LEAST_EXPONENT = 0.75
+"""Least exponent of a hysteresis. Chosen: below 1 the bend at zero force is a corner."""
 _MAGNET_REACH = 0.8
 """Share of a magnet's gap beyond which its force goes on as a straight line."""
 
@@ -55,6 +60,16 @@ PLAIN = Transform(lambda y: y, lambda v: v, "finite numbers")
 POSITIVE = Transform(np.log, lambda v: np.exp(np.clip(v, -60.0, 60.0)), "numbers above 0", span=np.log(1e3))
 FROM_ZERO = Transform(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v, 0.0), "numbers from 0", 1e-12)
 """A fit goes down to 1e-12: at 0 itself the derivatives by a slider would be those of one that never slips."""
+
+_EXPONENT = Transform(
+    lambda y: np.log(np.where(y >= _LEAST_EXPONENT, y, np.nan)),
+    lambda v: np.maximum(np.exp(np.clip(v, -60.0, 60.0)), _LEAST_EXPONENT),
+    f"numbers from {_LEAST_EXPONENT}",
+    least=float(np.log(_LEAST_EXPONENT)),
+    span=float(np.log(6.0)),
+)
+_RATIO = Transform(lambda y: y, lambda v: v, "finite numbers", span=10.0, size=2.0)
+"""Its zero means nothing: what is not identified has an interval from softening, 1, to hardening, -1."""
 
 
 @stored(kinds=lambda: LAWS)
@@ -167,7 +182,7 @@ class Damper(Law):
 
 
 class Joint(Law):
-    """A force with memory: Jenkins sliders side by side.
+    """A force with memory: Jenkins sliders, or hystereses that bend, side by side.
 
     They stand beside the linear part, which is that of the structure with all sliders slipping.
     """
@@ -175,6 +190,10 @@ class Joint(Law):
     @abstractmethod
     def sliders(self) -> Float:
         """float[2, n]: stiffness (N per unit of x) and largest force (N) of each slider."""
+
+    def bends(self) -> Float:
+        """float[3, n]: yield force (N), exponent and ratio gamma of each hysteresis (`hysteresis`); zeros for a slider."""
+        return np.zeros((3, self.sliders().shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -397,8 +416,55 @@ class Iwan(Joint):
         return np.array([stiffness, stiffness * self.slip * slip])
 
 
+@dataclass(frozen=True, eq=False)
+class BoucWen(Joint):
+    """Hysteresis of Bouc and Wen: ``dr/dx = k [1 - (sgn(r dx) + gamma) |r/(k slip)|^exponent]``.
+
+    These are all laws of Bouc and Wen that lose energy: with the usual ``dr/dx = k - (beta sgn(r dx) + gamma') |r|^n``,
+    ``beta = k (k slip)^-n`` is above zero and ``gamma = gamma'/beta`` is free. Whatever its numbers, the law is passive from
+    rest (`hysteresis`). From ``gamma`` -1 to 1 it is in class I of Ikhouane, Manosa and Rodellar (Systems and Control Letters
+    56, 2007, 197), above 1 in class II; from -1 down it hardens. Its force is at most ``k slip (1 + gamma)^(-1/exponent)``,
+    and at most 30 k, where it slips: there an element that hardens ends, far beyond the training data.
+    """
+
+    kind = "bouc-wen"
+    free: ClassVar = {"stiffness_n": POSITIVE, "slip": POSITIVE, "exponent": _EXPONENT, "gamma": _RATIO}
+    linear = "stiffness_n"
+    tried: ClassVar = {"slip": (0.1, 0.3, 1.0, 3.0), "exponent": (1.0, 2.0), "gamma": (-1.5, 0.0, 0.8)}
+
+    stiffness_n: float = 1.0
+    """Stiffness at the turning of the force through zero, N per unit of x."""
+    slip: float = 1.0
+    """Displacement x with which the stiffness would reach the force at which bends are as large as the stiffness."""
+    exponent: float = 1.0
+    """Sharpness of the bend."""
+    gamma: float = 0.0
+    """Ratio of gamma to beta: bends in loading ``1 + gamma``, in unloading ``1 - gamma``."""
+
+    def sliders(self) -> Float:
+        """float[2, 1]: stiffness and largest force."""
+        least = 1.0 + self.gamma
+        softest = self.slip * least ** (-1.0 / self.exponent) if least > 0.0 else np.inf
+        return self.stiffness_n * np.array([[1.0], [min(softest, _LARGEST_ELASTIC)]])
+
+    def bends(self) -> Float:
+        """float[3, 1]: yield force, exponent and ratio."""
+        return np.array([[self.stiffness_n * self.slip], [self.exponent], [self.gamma]])
+
+
 LAWS: dict[str, type[Law]] = {
     law.kind: law
-    for law in (PolynomialSpring, SplineSpring, Stop, MagnetSpring, UserSpring, PolynomialDamper, Jenkins, Iwan, Masing)
+    for law in (
+        PolynomialSpring,
+        SplineSpring,
+        Stop,
+        MagnetSpring,
+        UserSpring,
+        PolynomialDamper,
+        Jenkins,
+        Iwan,
+        Masing,
+        BoucWen,
+    )
 }
 """All laws by their names."""

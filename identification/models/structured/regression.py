@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.kernels import jenkins_forces
+from identification.models.structured.hysteresis import joint_forces
 from identification.models.structured.laws import POSITIVE, Damper, Joint, Law, Spring
 from identification.models.structured.model import StructuredModel
 from vibrolock.arrays import Float
@@ -41,8 +41,9 @@ def law_force(law: Law, x: Float, speed: Float) -> Float:
         return law.force(x)
     if isinstance(law, Damper):
         return law.damping(x) * speed
-    out = np.zeros_like(x)
-    jenkins_forces(np.ascontiguousarray(cast(Joint, law).sliders().T), np.ascontiguousarray(x), out)
+    out, joint = np.zeros_like(x), cast(Joint, law)
+    sliders, bends = (np.ascontiguousarray(one.T) for one in (joint.sliders(), joint.bends()))
+    joint_forces(sliders, bends, np.ascontiguousarray(x), out)
     return out
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.models.structured.elements import DerivativeTables
+from identification.models.structured.hysteresis import hysteresis_by, hysteresis_step
 from identification.models.structured.kernels import damping_at, jenkins_step, mean_spring, spring_at
 from identification.models.structured.steps import (
     System,
@@ -190,7 +191,8 @@ def of_step(
         begin_sticking(system, work, e, state, derivatives)
         add_sliders(system, work, e, derivatives)
         of_slips(system, work, e, derivatives)
-        add_laws(system, work, changes, e, dot(q, system.phi[e]))
+        of_hystereses(system, work, e, state, derivatives)
+        add_laws(system, work, changes, e, dot(q, system.phi[e]), state)
         add_dforce(system, work, e, work.mean, rhs)
         for i in range(n):
             for k in range(n):
@@ -205,6 +207,8 @@ def begin_sticking(system: System, work: Workspace, e: int, state: np.ndarray, d
     for s in range(tables.first[e], tables.first[e + 1]):
         at = 2 * n + 1 + s
         stiffness = tables.sliders[s, 0]
+        if tables.bends[s, 1] != 0.0:
+            continue
         work.stuck[s] = jenkins_step(state[at], stiffness, tables.sliders[s, 1], system.step_s * work.w[e])[3]
         if work.stuck[s] > 0.0 and not derivatives.sticks[s]:
             add(derivatives.rows[at], -stiffness, work.row)
@@ -227,10 +231,23 @@ def of_slips(system: System, work: Workspace, e: int, derivatives: Sensitivities
 
 
 @inner_kernel
-def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int, x: float) -> None:
+def of_hystereses(system: System, work: Workspace, e: int, state: np.ndarray, derivatives: Sensitivities) -> None:
+    """Add what the forces of an element's hystereses at the beginning of a step change of their mean to ``work.dforce``."""
+    n, tables, way = system.omega.size, system.tables, system.step_s * work.w[e]
+    for s in range(tables.first[e], tables.first[e + 1]):
+        bend, at = tables.bends[s], 2 * n + 1 + s
+        if bend[1] != 0.0:
+            by_r = hysteresis_step(
+                state[at], tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], way
+            )[3]
+            add(work.dforce, by_r, derivatives.rows[at])
+
+
+@inner_kernel
+def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int, x: float, state: np.ndarray) -> None:
     """Add the derivatives of an element's mean force over a step from ``x`` by the numbers of its laws to ``work.dforce``."""
     begin, way, reach = law_columns(system), system.step_s * work.w[e], system.tables.limits[e, 0]
-    springs, dampers = changes.springs.shape[0], changes.dampers.shape[0]
+    springs, dampers, tables = changes.springs.shape[0], changes.dampers.shape[0], system.tables
     for k in range(springs + dampers):
         if changes.element[k] != e:
             continue
@@ -245,25 +262,69 @@ def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int,
         total = 0.0
         for s in range(changes.first[k], changes.last[k]):
             by, share = changes.sliders[k, s], work.stuck[s]
+            if tables.bends[s, 1] != 0.0:
+                r, by_bend = state[2 * system.omega.size + 1 + s], changes.bends[k, s]
+                total += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[0]
+                continue
             total += sign * (1.0 - share) * by[1] + 0.5 * share * share * way * by[0]
         work.dforce[begin + k] += total
 
 
 @inner_kernel
-def end_sliders(system: System, work: Workspace, changes: DerivativeTables, derivatives: Sensitivities) -> None:
-    """Take the derivatives of the sliders by the numbers of their joints to the end of the step."""
-    n = system.omega.size
+def end_sliders(
+    system: System,
+    work: Workspace,
+    changes: DerivativeTables,
+    state: np.ndarray,
+    derivatives: Sensitivities,
+    rhs: np.ndarray,
+) -> None:
+    """Take the derivatives of the sliders by the numbers of their joints, and of hystereses by all, to the end of the step.
+
+    ``rhs``: derivatives of the mean velocities of the step.
+    """
+    n, tables = system.omega.size, system.tables
+    end_hystereses(system, work, state, derivatives, rhs)
     joints = changes.springs.shape[0] + changes.dampers.shape[0]
     for k in range(changes.sliders.shape[0]):
         e, column = changes.element[joints + k], law_columns(system) + joints + k
         way = system.step_s * work.w[e]
         for s in range(changes.first[k], changes.last[k]):
             by, own = changes.sliders[k, s], derivatives.rows[2 * n + 1 + s]
-            if derivatives.sticks[s]:
+            if tables.bends[s, 1] != 0.0:
+                r, by_bend = state[2 * n + 1 + s], changes.bends[k, s]
+                own[column] += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[1]
+            elif derivatives.sticks[s]:
                 own[column] += way * by[0]
                 derivatives.sums[e, column] += way * by[0]
             else:
                 own[column] = math.copysign(1.0, way) * by[1]
+
+
+@inner_kernel
+def end_hystereses(
+    system: System, work: Workspace, state: np.ndarray, derivatives: Sensitivities, rhs: np.ndarray
+) -> None:
+    """Take the derivatives of hystereses to the end of the step, but for those by their own numbers in it."""
+    n, h, tables = system.omega.size, system.step_s, system.tables
+    for e in range(system.phi.shape[0]):
+        begin, ready = 2 * n + n * system.inputs + e * n, False
+        for s in range(tables.first[e], tables.first[e + 1]):
+            bend, at = tables.bends[s], 2 * n + 1 + s
+            if bend[1] == 0.0:
+                continue
+            if not ready:  # the derivatives of the element's rate
+                work.row[:] = 0.0
+                for i in range(n):
+                    add(work.row, system.phi[e, i], rhs[i])
+                    work.row[begin + i] += work.mean[i]
+                ready = True
+            _, _, _, _, by_way, by_r = hysteresis_step(
+                state[at], tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], h * work.w[e]
+            )
+            own = derivatives.rows[at]
+            for c in range(own.size):
+                own[c] = by_r * own[c] + by_way * h * work.row[c]
 
 
 @inner_kernel
@@ -336,6 +397,6 @@ def run_with_sensitivities(
             take_input(system, work, u, row, row + 1, state[2 * n])
             take_step(system, work, q, v, r)
             of_step(system, work, changes, state, half, derivatives, matrix, rhs)
-            end_sliders(system, work, changes, derivatives)
+            end_sliders(system, work, changes, state, derivatives, rhs)
             end_sensitivities(system, half, sens, rhs, work.row)
             end_step(system, work, q, v, state)

@@ -23,8 +23,20 @@ _UNITS = {
     "damper_n_s_m": "N s/m",
     "slider_stiffness_n_m": "N/m",
     "slider_strength_n": "N",
+    "slider_yield_n": "N",
+    "slider_exponent": "",
+    "slider_gamma": "",
     "fs": "Hz",
 }
+_SLIDERS = (
+    "slider_element",
+    "slider_stiffness_n_m",
+    "slider_strength_n",
+    "slider_yield_n",
+    "slider_exponent",
+    "slider_gamma",
+)
+"""Arrays of the sliders; the last three with hystereses only."""
 
 
 def structured_parts(model: StructuredModel) -> Contents:
@@ -32,13 +44,14 @@ def structured_parts(model: StructuredModel) -> Contents:
 
     For each element, in rows: ``directions`` [element, mode], ``displacement_m``, ``spring_n``, ``damper_n_s_m`` [element,
     point]; ``spring_n`` is NaN with functions of the user, which are not imported. The sliders of all joints are in
-    ``slider_element`` (from 1), ``slider_stiffness_n_m``, ``slider_strength_n``. The laws themselves, from which a file is
-    read back, are in the attributes.
+    ``slider_element`` (from 1), ``slider_stiffness_n_m``, ``slider_strength_n``; with hystereses of Bouc and Wen
+    among them ``slider_yield_n``, ``slider_exponent`` and ``slider_gamma``, zeros for sliders of Jenkins. The laws themselves,
+    from which a file is read back, are in the attributes.
     """
     arrays, attributes = encode(model)
     out: dict[str, Any] = {**arrays, "fs": np.array([model.sample_rate_hz])}
     unit = np.linspace(-1.0, 1.0, _POINTS)
-    springs, dampers, sliders = [], [], [np.zeros((3, 0))]
+    springs, dampers, sliders = [], [], [np.zeros((6, 0))]
     for number, element in enumerate(model.elements, 1):
         x = element.reach * unit
         of_springs = [law for law in element.laws if isinstance(law, Spring)]
@@ -50,7 +63,8 @@ def structured_parts(model: StructuredModel) -> Contents:
         for law in element.laws:
             if isinstance(law, Joint):
                 stiffness, strength = law.sliders()
-                sliders.append(np.array([np.full(strength.size, number), stiffness / element.scale_m, strength]))
+                own = [np.full(strength.size, number), stiffness / element.scale_m, strength, *law.bends()]
+                sliders.append(np.array(own))
     if model.elements:
         out |= {
             "directions": np.array([element.direction for element in model.elements]),
@@ -60,7 +74,8 @@ def structured_parts(model: StructuredModel) -> Contents:
         }
     every = np.concatenate(sliders, axis=1)
     if every.size:
-        out |= dict(zip(("slider_element", "slider_stiffness_n_m", "slider_strength_n"), every, strict=True))
+        bent = np.any(every[3:])
+        out |= dict(zip(_SLIDERS[: None if bent else 3], every[: None if bent else 3], strict=True))
     return Contents("structured", model.specimen, out, attributes, {}, {n: u for n, u in _UNITS.items() if n in out})
 
 

@@ -14,6 +14,7 @@ from rig.results.structured.model import IdentifiedStructured
 
 if TYPE_CHECKING:
     from identification import NonlinearElement
+    from identification.models import Joint
 
 
 _BEYOND = 1.5
@@ -54,8 +55,7 @@ def _laws(axis: Axes, element: "NonlinearElement", number: int) -> None:
     if springs:
         axis.plot(to_mm * x, sum((law.force(x) for law in springs), np.zeros_like(x)), color=MAIN, label="spring")
     if joints:
-        sliders = np.concatenate([law.sliders() for law in joints], axis=1)
-        axis.plot(*_loop(sliders, largest, to_mm), color=THIRD, label="joint")
+        axis.plot(*_loop(joints, largest, to_mm), color=THIRD, label="joint")
     axis.set(xlabel=f"displacement of element {number}, mm", ylabel="force, N", xlim=(to_mm * x[0], to_mm * x[-1]))
     if element.largest is not None:
         axis.axvspan(-to_mm * largest, to_mm * largest, color=REJECTED, alpha=0.15, lw=0.0, label="training data")
@@ -71,13 +71,13 @@ def _laws(axis: Axes, element: "NonlinearElement", number: int) -> None:
     axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
 
 
-def _loop(sliders: np.ndarray, largest: float, to_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return displacement (mm) and force (N) of parallel Jenkins sliders over a cycle, by the rules of Masing."""
-    down = np.linspace(largest, -largest, _POINTS)
-    stiffness, strength = sliders[:, :, None]
-    turned = np.minimum(stiffness * largest, strength) - np.minimum(stiffness * (largest - down), 2.0 * strength)
-    force = turned.sum(axis=0)
-    return to_mm * np.concatenate([down, -down]), np.concatenate([force, -force])
+def _loop(joints: "list[Joint]", largest: float, to_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return displacement (mm) and force (N) of joints over the second of two cycles."""
+    from identification.models import law_force
+
+    x = largest * np.cos(np.linspace(0.0, 2.0 * np.pi, 2 * _POINTS))
+    force = sum((law_force(law, x, np.zeros_like(x)) for law in joints), np.zeros_like(x))
+    return to_mm * x, force
 
 
 def curves(found: IdentifiedStructured, view: View) -> Curves:

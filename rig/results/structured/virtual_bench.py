@@ -232,6 +232,10 @@ def _nonlinear(model: StructuredModel, points: list[str]) -> Table:
             kept = _kept(element, damping, _FAITHFUL_DAMPING, smooth=False)
             numbers = {"deflection_m": _deflections(element, kept), "damping_n_s_m": _short(damping[kept])}
             elements.append({"kind": "damping-table", "at": at, **numbers})
+        if np.any(tables.bends[tables.first[e] : tables.first[e + 1]]):
+            raise IdentificationError(
+                f"{at}: has a hysteresis of Bouc and Wen, which no virtual rig has; allowed are jenkins, iwan, masing"
+            )
         stiffness, strength = (tables.sliders[tables.first[e] : tables.first[e + 1]] / [scale**2, scale]).T
         some = stiffness > _LEAST_SLIDER * np.sum(stiffness)
         if np.any(some):

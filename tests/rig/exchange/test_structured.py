@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 
+from identification import NonlinearElement
+from identification.models import BoucWen, Jenkins
 from rig.errors import RecordingError
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file
@@ -42,6 +44,22 @@ def test_the_tables_hold_the_forces_at_rest_and_at_the_reach(tmp_path):
     assert set(fields["slider_element"]) == {2}
     assert fields["slider_stiffness_n_m"].sum() == pytest.approx((0.5 + 0.2) / 2e-3)
     assert fields["slider_strength_n"][0] == pytest.approx(0.5 * 0.3)
+
+
+def test_a_hysteresis_comes_back_with_its_numbers_in_the_table_of_sliders(tmp_path):
+    element = NonlinearElement(
+        direction=[0.9, -0.1], scale_m=1e-3, laws=(Jenkins(0.5, 0.3), BoucWen(2.0, 0.4, 1.5, -0.5))
+    )
+    sent = structure(elements=(element,))
+    save(sent, tmp_path / "sent.h5")
+    export_file(tmp_path / "sent.h5", tmp_path / "m.mat", "mat")
+    found, u = import_file(tmp_path / "m.mat"), np.random.default_rng(0).normal(size=(1, 300))
+    assert np.array_equal(found.simulate(u).outputs, sent.simulate(u).outputs)
+    fields = loadmat(tmp_path / "m.mat", simplify_cells=True)["structured"]
+    np.testing.assert_allclose(fields["slider_yield_n"], [0.0, 0.8])
+    np.testing.assert_allclose(fields["slider_exponent"], [0.0, 1.5])
+    np.testing.assert_allclose(fields["slider_gamma"], [0.0, -0.5])
+    np.testing.assert_allclose(fields["slider_strength_n"], [0.15, 0.8 * 0.5 ** (-1.0 / 1.5)])
 
 
 def test_a_damaged_file_is_named(tmp_path):

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import rig
 from identification import ElementTrial, MissingForce, NonlinearElement
-from identification.models import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpring
+from identification.models import LAWS, BoucWen, Iwan, Jenkins, PolynomialSpring, UserSpring
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
 from rig.results.files import load, save
@@ -302,6 +302,16 @@ def test_the_loop_of_a_joint_is_that_of_its_sliders_moved_slowly():
         before = x
         moved.append(pulled.sum())
     np.testing.assert_allclose(force, moved[-z.size :], rtol=1e-9, atol=1e-12)
+
+
+def test_the_loop_of_a_hysteresis_that_softens_ends_at_its_largest_force():
+    law = BoucWen(2.0, 0.1, 2.0, 0.5)
+    element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(law,), largest=1.2)
+    _, axes = drawn(IdentifiedStructured(model=structure(elements=(element,))))
+    (line,) = [line for line in axes["displacement of element 1, mm"].get_lines() if line.get_label() == "joint"]
+    z, force = line.get_data()
+    assert np.max(np.abs(force)) == pytest.approx(0.2 * 1.5**-0.5, rel=1e-6)
+    assert abs(np.trapezoid(force, z)) > 0.8 * 4.0 * 1.2 * 0.2 * 1.5**-0.5
 
 
 def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_them_alone(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, backbone
-from identification.models import Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
+from identification.models import BoucWen, Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
 from rig.authoring.new_files import new_file
 from rig.bench import load_bench
 from rig.bench.cross_checks import cautions
@@ -190,6 +190,12 @@ def pushing(x, numbers):
 def test_a_spring_that_pushes_at_rest_is_refused():
     element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(UserSpring(f"{__name__}:pushing", (0.5,)),))
     with refused(IdentificationError, "element-its-springs-have-n-at"):
+        structured_bench(beam(elements=(element,)), load_bench("magnet-beam"))
+
+
+def test_a_hysteresis_is_refused():
+    element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(BoucWen(),))
+    with refused(IdentificationError, "element-has-a-hysteresis"):
         structured_bench(beam(elements=(element,)), load_bench("magnet-beam"))
 
 

@@ -87,6 +87,7 @@ def one_mode(stiffness, damper, step_s=0.01, omega=100.0, zeta=0.2):
         dampers=np.full((1, 201), damper),
         limits=np.array([[1.0, stiffness, stiffness]]),
         sliders=np.zeros((0, 2)),
+        bends=np.zeros((0, 3)),
         first=np.zeros(2, int),
     )
     one = np.ones((1, 1))

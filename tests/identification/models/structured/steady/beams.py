@@ -4,7 +4,7 @@ import numpy as np
 
 from identification import Channel
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring, Stop
+from identification.models.structured.laws import BoucWen, Iwan, Jenkins, PolynomialDamper, PolynomialSpring, Stop
 from identification.models.structured.model import StructuredModel
 
 OUTPUTS = (Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m/s"), Channel("middle", "response", "m"))
@@ -44,6 +44,13 @@ def friction(**changes) -> StructuredModel:
     slider = NonlinearElement(direction=[0.9, -0.1], scale_m=1e-3, laws=(Jenkins(stiffness_n=3.0, slip=0.2),))
     joint = NonlinearElement(direction=[0.3, 0.5], scale_m=1e-3, laws=(Iwan(stiffness_n=6.0, slip=0.8),))
     return beam(slider, joint, **changes)
+
+
+def hysteresis(**changes) -> StructuredModel:
+    """Two hystereses of Bouc and Wen, one that softens and one that hardens."""
+    softening = NonlinearElement(direction=[0.9, -0.1], scale_m=1e-3, laws=(BoucWen(3.0, 0.3, 1.5, 0.5),))
+    hardening = NonlinearElement(direction=[0.3, 0.5], scale_m=1e-3, laws=(BoucWen(6.0, 0.8, 1.0, -1.375),))
+    return beam(softening, hardening, **changes)
 
 
 def settled(model: StructuredModel, force_n: float, samples: int, periods: int) -> tuple[np.ndarray, float]:

@@ -4,16 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from identification import IdentificationError, backbone, frequency_response, steady_state
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.laws import Jenkins, Masing
+from identification.models.structured.laws import BoucWen, Jenkins, Masing
 from tests.identification.models.pnlss.steady.oscillators import shaker
-from tests.identification.models.structured.steady.beams import beam, friction, smooth
+from tests.identification.models.structured.steady.beams import beam, friction, hysteresis, smooth
 from tests.refused import refused
 
 
-@pytest.mark.parametrize("make", [smooth, friction])
+@pytest.mark.parametrize("make", [smooth, friction, hysteresis])
 @pytest.mark.parametrize("options", [{}, {"force": "fundamental", "exciter": shaker()}], ids=["sine", "coupled"])
 def test_the_backbone_goes_through_the_peak_of_the_frequency_response(make, options):
     found = backbone(make(), 2.0, largest_range_use=3.0, **options)
@@ -75,6 +76,33 @@ def test_joints_whose_sliders_slip_at_the_first_force_have_a_backbone(seed):
     force = np.pi * np.abs(found.force_n[:, 1]) * z
     np.testing.assert_allclose(damper + joint, force, rtol=0.02)
     assert np.max(joint / force) > 0.3
+
+
+def test_a_backbone_with_a_hysteresis_does_the_work_that_its_loop_takes():
+    law, scale, direction = BoucWen(6.0, 0.3, 1.0, -0.4), 1e-3, 0.9
+    model = beam(NonlinearElement(direction=[direction, 0.0], scale_m=scale, laws=(law,), reach=3.0))
+    found = backbone(model, 1.0, largest_range_use=3.0)
+    z = np.abs(found.displacement_m[:, 1, 0])
+    damper = (
+        np.pi * 2.0 * model.damping_ratio[0] * model.omega[0] * 2.0 * np.pi * found.frequency_hz * (z / direction) ** 2
+    )
+    force, some = np.pi * np.abs(found.force_n[:, 1]) * z, slice(5, None, 12)
+    loops = np.array([scale * _loop(law, a / scale) for a in z[some]])
+    np.testing.assert_allclose(damper[some] + loops, force[some], rtol=0.02)
+    assert np.max(loops / force[some]) > 0.3
+
+
+def _loop(law, amplitude):
+    """Area of the loop over a sine, by Wen's equation of exponent 1 from rest for twenty cycles."""
+
+    def rates(phase, state):
+        r, dx = state[0], amplitude * np.cos(phase)
+        dr = law.stiffness_n * (dx - (abs(dx) * r + law.gamma * dx * abs(r)) / (law.stiffness_n * law.slip))
+        return [dr, r * dx]
+
+    cycle = 2.0 * np.pi
+    found = solve_ivp(rates, (0.0, 20.0 * cycle), [0.0, 0.0], t_eval=[19.0 * cycle, 20.0 * cycle], rtol=1e-6, atol=1e-9)
+    return float(np.diff(found.y[1])[0])
 
 
 def test_a_backbone_begins_at_the_mode_that_is_asked_for():

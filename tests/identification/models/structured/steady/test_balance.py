@@ -10,14 +10,16 @@ from identification.models.structured.balance import StructuredBalance, along_pe
 from identification.models.structured.model import workspace_for
 from identification.models.structured.steps import run
 from tests.identification.models.pnlss.steady.oscillators import shaker
-from tests.identification.models.structured.steady.beams import beam, friction, settled, smooth
+from tests.identification.models.structured.steady.beams import beam, friction, hysteresis, settled, smooth
 from tests.refused import refused
 
 RATE_HZ = 16000.0
 
 
 @pytest.mark.parametrize(
-    "model", [smooth(), smooth(support_n_m=3e5), friction()], ids=["smooth", "bounded", "friction"]
+    "model",
+    [smooth(), smooth(support_n_m=3e5), friction(), hysteresis()],
+    ids=["smooth", "bounded", "friction", "hysteresis"],
 )
 @pytest.mark.parametrize("held", ["sine", "fundamental", "rms", "voltage"])
 def test_the_jacobian_agrees_with_finite_differences(model, held):
@@ -60,7 +62,7 @@ def test_without_elements_the_response_is_that_of_the_modes_and_the_support():
 
 
 @pytest.mark.parametrize("samples", [640, 610])
-@pytest.mark.parametrize("make", [smooth, friction])
+@pytest.mark.parametrize("make", [smooth, friction, hysteresis])
 def test_a_settled_simulation_has_the_harmonics_of_the_balance(make, samples):
     simulated, change = settled(make(rate_hz=RATE_HZ, steps=1), 1.0, samples, 300)
     found = steady_state(make(), RATE_HZ / samples, 1.0, support=True, harmonics=13, largest_range_use=3.0)
@@ -81,7 +83,8 @@ def test_a_slider_loses_the_energy_of_its_loop():
     coefficients[1, 0] = amplitude
     x = np.ascontiguousarray((basis.to_time @ coefficients).T)
     force, damping, by = np.empty((2, 4000)), np.empty((2, 4000)), np.empty((2, 4000, 3))
-    along_period(system, x, np.zeros_like(x), basis.to_time, np.zeros_like(basis.to_time), force, damping, by)
+    rows = np.empty((2, 3))
+    along_period(system, x, np.zeros_like(x), basis.to_time, np.zeros_like(basis.to_time), rows, force, damping, by)
     middle = 0.5 * (force[0] + np.roll(force[0], -1))
     lost = float(np.sum(middle * (np.roll(x[0], -1) - x[0])))
     assert lost == pytest.approx(4.0 * strength * (amplitude - strength / stiffness), rel=1e-5)
