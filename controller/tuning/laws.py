@@ -157,25 +157,30 @@ class ComplexResponseLaw:
     def rows(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
         """Return the rows of K(s) for ln|U| and arg U [n, 2, 4]."""
         del plant
-        force = self.force_per_s / s
-        cot = 1.0 / math.tan(math.radians(lag_deg))
-        level = np.stack([force, force * cot, np.ones_like(s), -force * cot], axis=-1)
-        phase = np.zeros_like(level)
-        phase[:, 3] = 1.0
-        return self._turn(s, np.stack([level, phase], axis=1))
+        real, imag = self._parts(s)
+        out = np.zeros((s.size, 2, 4), np.complex128)
+        out[:, 0, 2], out[:, 0, 3] = real, -imag
+        out[:, 1, 2], out[:, 1, 3] = imag, real
+        if self.force_per_s:
+            force = self.force_per_s / s
+            cot = 1.0 / math.tan(math.radians(lag_deg))
+            for row, part in enumerate((real, imag)):
+                out[:, row, 0] = part * force
+                out[:, row, 1] = part * force * cot
+                out[:, row, 3] -= part * force * cot
+        return out
 
     def level(self, s: Complex, plant: PlantModel, lag_deg: float) -> Complex:
         """Return the direct gain from a relative change of the level to ln|U| and arg U [n, 2]."""
         del plant, lag_deg
-        error = np.stack([self.force_per_s / s if self.force_per_s else np.ones_like(s), np.zeros_like(s)], axis=-1)
-        return self._turn(s, error[:, :, None])[:, :, 0]
+        error = self.force_per_s / s if self.force_per_s else np.ones_like(s)
+        return np.stack([part * error for part in self._parts(s)], axis=-1)
 
-    def _turn(self, s: Complex, error: Complex) -> Complex:
-        """Return (kp + K/s) E after the smoothing, with real and imaginary part as separate rows [n, 2, ...]."""
+    def _parts(self, s: Complex) -> tuple[Complex, Complex]:
+        """Return the transfer functions [n] from E to ln|U| and to arg U: (kp + K/s) after the smoothing, kp being complex."""
         smoothing = self._smoothing(s)
-        real = ((complex(self.proportional).real + self.integral_per_s / s) * smoothing)[:, None]
-        imag = (complex(self.proportional).imag * smoothing)[:, None]
-        return np.stack([real * error[:, 0] - imag * error[:, 1], imag * error[:, 0] + real * error[:, 1]], axis=1)
+        kp = complex(self.proportional)
+        return np.asarray((kp.real + self.integral_per_s / s) * smoothing), np.asarray(kp.imag * smoothing)
 
 
 LinearAmplitudeLaw = ForceLaw | LogForceLaw | LogResponseLaw | ComplexResponseLaw

@@ -114,20 +114,22 @@ def choose(
         if best is not None and candidate.worth < best.worth - MAX_SLOPE_LOSS:
             break
         tried += 1
-        if (best is None or candidate.quickness > best.quickness) and _suits(candidate.loop, plant, responses):
-            best = candidate
+        if (best is None or candidate.quickness > best.quickness) and (
+            suited := _suits(candidate.loop, plant, responses)
+        ):
+            best, design = candidate, suited
     if best is None:
         raise _unsuited(plant, responses, allowed[-1], tried)
     w, share = best.loop.low_pass_rad_s, best.share
-    designs = [assess(replace(best.loop, plant=other)) for other in _damped(plant)]
+    others = [assess(replace(best.loop, plant=other)) for other in _damped(plant)[1:]]
     return Chosen(
         law="frequency-error",
         low_pass_rad_s=w,
         cancels=best.cancels,
         share=share,
         force_share=_force_share(best.loop),
-        design=designs[0],
-        others=tuple(designs[1:]),
+        design=design,
+        others=tuple(others),
         closed_form=hippold_gains(plant, w),
         slopes=best.slopes,
         outside=_beyond(best.loop, responses),
@@ -183,12 +185,16 @@ def _damped(plant: PlantModel) -> list[PlantModel]:
     return [plant.at(damping_ratio=plant.damping_ratio * part) for part in DAMPINGS]
 
 
-def _suits(loop: ControlLoop, plant: PlantModel, responses: FrequencyResponseMatrix) -> bool:
+def _suits(loop: ControlLoop, plant: PlantModel, responses: FrequencyResponseMatrix) -> Design | None:
+    """Return the assessment of gains at the damping measured if they suit all dampings, else None."""
     if _beyond(loop, responses)[0] > MAX_GAIN_OUTSIDE or max(gains_at_half(loop).values()) > LARGEST_AT_HALF:
-        return False
+        return None
     bounds = (MAX_SENSITIVITY, *(OTHER_SENSITIVITY for _ in DAMPINGS[1:]))
     peaks = (_quick_peak(replace(loop, plant=other)) for other in _damped(plant))
-    return all(peak <= bound for peak, bound in zip(peaks, bounds, strict=True)) and assess(loop).suited
+    if any(peak > bound for peak, bound in zip(peaks, bounds, strict=True)):
+        return None
+    design = assess(loop)
+    return design if design.suited else None
 
 
 def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, tried: int) -> UnsuitedError:

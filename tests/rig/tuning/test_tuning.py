@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -26,24 +25,19 @@ from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
 from tests.refused import refused
 from tests.rig.rigs import bench_with
+from tests.rig.tuning.tuned import tuned_once
 
 NAMES = ("magnet-beam", "friction-beam")
 
 
-@pytest.fixture(scope="module")
-def tunings(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("tuned")
-    return cache(lambda name: tune(name, folder / f"{name}.h5"))
-
-
 @pytest.fixture(params=NAMES)
-def tuned(request, tunings):
-    return tunings(request.param)
+def tuned(request):
+    return tuned_once(request.param)
 
 
 @pytest.fixture
-def magnet(tunings):
-    return tunings("magnet-beam")
+def magnet():
+    return tuned_once("magnet-beam")
 
 
 def coupled_pole_of(virtual, near_hz):
@@ -268,7 +262,8 @@ def test_the_figure_names_what_a_test_engineer_looks_for(magnet):
     np.testing.assert_allclose(measured.get_ydata(), np.abs(magnet.test.responses.value[:, 0, 0]))
 
 
-def test_a_remark_on_the_bench_is_made_once(tmp_path):
+def test_a_remark_on_the_bench_is_made_once(magnet, tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.tuning.tuning.choose", lambda *_: magnet.chosen)  # gains do not matter
     said = []
 
     class Listening(Silent):
