@@ -130,6 +130,7 @@ def test_the_force_is_a_sine_on_both_branches_and_the_points_lie_on_the_curve():
 
 def test_prescribed_harmonics_are_those_of_the_true_force():
     plan = load_plan("magnet-beam/harmonics-varied")
+    plan = plan.model_copy(update={"levels_v": (plan.levels_v[0], plan.levels_v[-1])})
     with rig.run(plan, seed=2) as run:
         assert run.complete
         points = true_points(run.recording, 2)
@@ -214,9 +215,11 @@ def test_short_points_follow_the_ramp_with_a_small_error_and_say_so():
 
 def test_ten_times_the_noise_leaves_a_sine_within_the_standard_errors():
     bench = bench_with(noise_scale=10.0)
-    with rig.run("magnet-beam/backbone-pure", bench=bench, seed=1) as run:
+    plan = load_plan("magnet-beam/backbone-pure")
+    plan = plan.model_copy(update={"levels_v": plan.levels_v[::3]})
+    with rig.run(plan, bench=bench, seed=1) as run:
         assert run.complete
-        require_a_sine(run.recording, 1, 13)
+        require_a_sine(run.recording, 1, 5)
 
 
 @pytest.mark.parametrize(
@@ -238,14 +241,14 @@ def test_over_a_wire_with_a_queue_of_two_the_force_is_a_sine():
     table = bench.model_dump()
     table["driver"]["options"]["converter"] = {"substeps": 10, "anti_alias_hz": 0.0, "oversampling": 1}
     bench = Bench.model_validate(table)
-    plan = changed("magnet-beam/backbone-pure", levels_v=(1.6862, 3.3626), record_periods=20)
+    plan = changed("magnet-beam/backbone-pure", levels_v=(3.3626,), record_periods=20)
     with rig.run(plan, bench=bench, seed=1) as run:
         assert run.complete
-        alone = require_a_sine(run.recording, 1, 2)
+        alone = require_a_sine(run.recording, 1, 1)
     with emulated(bench, "serial", lockstep=True, seed=1) as wired, rig.run(plan, bench=wired, seed=1) as run:
         assert run.complete
         assert not any(run.recording.parts[-1].end["counters"].values())
-        over = require_a_sine(run.recording, 1, 2, bench=bench)
+        over = require_a_sine(run.recording, 1, 1, bench=bench)
     for one, other in zip(alone, over, strict=True):
         assert other.point["damping_ratio"] == pytest.approx(one.point["damping_ratio"], rel=5e-4)
 

@@ -10,8 +10,8 @@ NEAR_HZ = {"magnet-beam": [24.37, 134.06, 380.9], "friction-beam": [149.0, 564.3
 
 
 def modal_test(name: str, level_rms_v: float, **options: object) -> LinearModes:
-    """The shipped modal test at one level, identified as `rig identify` does; on another bench at this level alone."""
-    changes = {"levels_rms_v": [level_rms_v]} if options else {}
+    """The shipped modal test at one level, identified as `rig identify` does; on another bench with two realisations."""
+    changes = {"levels_rms_v": [level_rms_v], "realisations": 2} if options else {}
     bench = bench_with(name=name, **options) if options else None
     with recorded_run(f"{name}/modal", bench, seed=3, **changes) as run:
         assert run.complete

@@ -160,7 +160,7 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
 
 
 def test_scatter_of_the_specimen_from_run_to_run_is_recovered() -> None:
-    scatter, plan = {"frequency": 5e-4}, every(3, "magnet-beam")
+    scatter, plan = {"frequency": 5e-4}, every(7, "magnet-beam")
     found = repeatability([measured("magnet-beam", seed, plan, scatter=scatter) for seed in range(1, 11)])
     size, low, high = found.scatter("modal_frequency_hz")
     rigs = [VirtualRig.shipped("magnet-beam", scatter=scatter).realised(seed) for seed in range(1, 11)]

@@ -46,6 +46,14 @@ class StructuredBalance(DrivenBalance):
         self._mean_supported = float(support)
         self._turning = basis.turned(0.0)[1]
         self._to_rate = basis.to_time @ self._turning
+        phi = self._system.phi
+        self._pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), modes * modes)
+        self._orders = np.array([int(order) for order in model.motions], float)
+        turned = [np.linalg.matrix_power(self._turning, int(order)) for order in model.motions]
+        self._motions_by = np.stack(
+            [one[..., None] * shape for one, shape in zip(turned, model.output_shapes, strict=True)], axis=1
+        )
+        """Derivatives of the outputs' coefficients by those of the states at 1 rad/s [size, outputs, size, n]."""
         shape = (self.ranges, basis.samples)
         self._work = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
         self._rows = np.empty((2, basis.size))
@@ -87,7 +95,7 @@ class StructuredBalance(DrivenBalance):
 
         residual_by = np.zeros((size, n, size, n + b.shape[1]))
         linear = residual_by[..., :n]
-        linear += np.einsum("epq,ei,ej->piqj", back @ by, phi, phi, optimize=True)
+        linear += self._between_modes(back @ by)
         for i in range(n):
             linear[:, i, :, i] += w**2 * twice + w * own_damping[i] * d + model.omega[i] ** 2 * np.eye(size)
         for p in range(size):
@@ -101,6 +109,12 @@ class StructuredBalance(DrivenBalance):
         outputs, outputs_by, outputs_by_w = self._outputs(states, inputs, w)
         to_hz = 2.0 * np.pi
         return Period(outputs, residual, outputs_by, residual_by, to_hz * outputs_by_w, to_hz * by_w)
+
+    def _between_modes(self, parts: Float) -> Float:
+        """Return what parts of the elements [e, p, q] are in modal coordinates [p, i, q, j], summed over the elements."""
+        size, n = self.basis.size, self.n_states
+        summed = parts.reshape(len(parts), size * size).T @ self._pairs
+        return np.asarray(summed.reshape(size, size, n, n).transpose(0, 2, 1, 3))
 
     def _elements(self, states: Float, w: float) -> tuple[Float, Float, Float]:
         along = states @ self._system.phi.T
@@ -127,17 +141,13 @@ class StructuredBalance(DrivenBalance):
 
     def _outputs(self, states: Float, inputs: Float, w: float) -> tuple[Float, Float, Float]:
         """Coefficients of the outputs, and derivatives by those of (x, u) and by w."""
-        model, n = self.model, self.n_states
+        n = self.n_states
         by = np.zeros((self.basis.size, len(self.outputs), self.basis.size, n + len(self.inputs)))
-        by_w = np.zeros((self.basis.size, len(self.outputs)))
-        for row, order in enumerate(model.motions):
-            turned = np.linalg.matrix_power(w * self._turning, int(order))
-            by[:, row, :, :n] = turned[..., None] * model.output_shapes[row]
-            by_w[:, row] = order / w * (turned @ states @ model.output_shapes[row])
+        by[..., :n] = self._motions_by * w ** self._orders[:, None, None]
         for p in range(self.basis.size):
-            by[p, :, p, n:] = model.direct
-        variables = np.concatenate([states, inputs], axis=1)
-        return np.tensordot(by, variables, axes=2), by, by_w
+            by[p, :, p, n:] = self.model.direct
+        moved = np.tensordot(by[..., :n], states, axes=2)
+        return moved + inputs @ self.model.direct.T, by, moved * self._orders / w
 
     def _at_rest(self, frequency_hz: float) -> Period:
         size = self.basis.size
@@ -164,7 +174,7 @@ class StructuredBalance(DrivenBalance):
         parts = np.array([(self.basis.to_coefficients * row) @ self.basis.to_time for row in damping])
         own_damping = np.zeros((self.basis.size, n, self.basis.size, n))
         if len(parts):
-            own_damping += np.einsum("epq,ei,ej->piqj", parts, self._system.phi, self._system.phi, optimize=True)
+            own_damping += self._between_modes(parts)
         for i in range(n):
             own = 2.0 * self.model.damping_ratio[i] * self.model.omega[i]
             own_damping[:, i, :, i] += own * np.eye(self.basis.size) + 2.0 * w * self._turning

@@ -41,8 +41,8 @@ WEAK_EXCITER = {
         ("modes", {"structure", "coupled"}),
         ("responses", {"frequency_hz", "force_n_per_v", "acceleration_m_s2_per_v", "acceleration_m_s2_per_n"}),
         ("backbone --points 3", {"points", "loops", "frequency_shift"}),
-        ("constant-force --points 9", {"curves", "backbone"}),
-        ("forced --points 9", {"up", "down", "force", "voltage_v"}),
+        ("constant-force --points 5", {"curves", "backbone"}),
+        ("forced --points 5", {"up", "down", "force", "voltage_v"}),
     ],
 )
 def test_every_analysis_of_every_shipped_bench_needs_nothing_but_its_name(command, tmp_path, bench, what, held):

@@ -23,7 +23,7 @@ def spoilt(**changes):
     return plan_from(table, "spoilt plan")
 
 
-def improved(plan, hypotheses=CALM, draws=4, bench=None):
+def improved(plan, hypotheses=CALM, draws=2, bench=None):
     request = RehearsalRequest(
         plan=plan,
         bench=bench or magnet_beam(),
