@@ -11,9 +11,8 @@ import numpy as np
 import typer
 from numba import njit
 
-from identification import Channel, LinearModes, fit_structured
-from identification.experiments.experiment import Experiment
-from identification.experiments.residuals import residual_over_noise
+from identification import Channel, Experiment, LinearModes, fit_structured
+from identification.experiments import residual_over_noise
 from identification.models import LAWS
 from vibrolock.arrays import Float
 

@@ -8,7 +8,11 @@ if TYPE_CHECKING:
     from identification.experiments.experiment import InitialState as InitialState
     from identification.experiments.noise import mean_covariance as mean_covariance
     from identification.experiments.periodicity import period_remark as period_remark
-    from identification.experiments.residuals import EXPLAINED as EXPLAINED, lacks_something as lacks_something
+    from identification.experiments.residuals import (
+        EXPLAINED as EXPLAINED,
+        lacks_something as lacks_something,
+        residual_over_noise as residual_over_noise,
+    )
     from identification.experiments.simulators import Simulator as Simulator
     from identification.experiments.time_experiments import suitable_rate_hz as suitable_rate_hz
 else:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from identification.models.structured.laws import (
         LAWS as LAWS,
         BoucWen as BoucWen,
+        Coulomb as Coulomb,
         Damper as Damper,
         Iwan as Iwan,
         Jenkins as Jenkins,

@@ -11,6 +11,7 @@ the Jacobian J and the damping C. Its multipliers over a period are ``exp(2 pi s
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.harmonic_balance.basis import Basis, complex_product
 from identification.harmonic_balance.driven import DrivenBalance, Period
@@ -28,6 +29,22 @@ CLOSED = 1e-11  # what a loop misses when it is closed, relative to its largest 
 LOSSLESS = 1e-9  # share of a change of force that a period takes, below which a hysteresis is a spring
 
 
+DRY = 1e-3
+"""Displacement x at which dry friction slips, about what a sample of a period moves next to its turning point. Chosen."""
+
+
+def _is_dry(system: System) -> NDArray[np.bool_]:
+    return np.asarray(system.tables.bends[:, 1] < 0.0)
+
+
+def _with_soft_friction(system: System, slip: float) -> System:
+    """Return the system with sliders that slip at a displacement in place of dry friction; at infinity without force."""
+    tables, dry = system.tables, _is_dry(system)
+    sliders, bends = tables.sliders.copy(), tables.bends.copy()
+    sliders[dry, 0], bends[dry] = sliders[dry, 1] / slip, 0.0
+    return system._replace(tables=tables._replace(sliders=sliders, bends=bends))
+
+
 class StructuredBalance(DrivenBalance):
     """Equations of a driven structured model; its states are the modal coordinates.
 
@@ -40,7 +57,8 @@ class StructuredBalance(DrivenBalance):
     def __init__(self, model: StructuredModel, drive: Drive, basis: Basis, support: bool = True) -> None:
         modes, self.ranges = len(model.omega), len(model.elements)
         super().__init__(model, modes, drive, basis)
-        self.model, self.order, self._system = model, 2 * modes, model.system
+        self.model, self.order, self._system = model, 2 * modes, _with_soft_friction(model.system, DRY)
+        self._slipping = _with_soft_friction(self._system, np.inf) if _is_dry(model.system).any() else None
         self.kinks = len(self._system.tables.sliders) > 0
         self._range = np.array([element.largest or element.reach for element in model.elements])
         self._mean_supported = float(support)
@@ -151,7 +169,10 @@ class StructuredBalance(DrivenBalance):
 
     def _at_rest(self, frequency_hz: float) -> Period:
         size = self.basis.size
-        return self.along(np.zeros((size, self.n_states)), np.zeros((size, len(self.inputs))), frequency_hz)
+        own, self._system = self._system, self._slipping or self._system
+        found = self.along(np.zeros((size, self.n_states)), np.zeros((size, len(self.inputs))), frequency_hz)
+        self._system = own
+        return found
 
     def linear_response(self, frequency_hz: float, row: int) -> tuple[Complex, Complex]:
         """Return modal coordinates and outputs of small vibrations."""

@@ -71,13 +71,13 @@ class NonlinearElement:
 
     @property
     def at_rest(self) -> tuple[float, float]:
-        """Stiffness (J) and damping (J s) for small x, with all sliders stuck."""
+        """Stiffness (J) and damping (J s) for small x, with all sliders stuck but those of dry friction."""
         near = _DELTA * self.reach
         slope = sum(
             float(np.diff(one.force(np.array([-near, near])))[0]) for one in self.laws if isinstance(one, Spring)
         )
         damping = sum(float(one.damping(np.zeros(1))[0]) for one in self.laws if isinstance(one, Damper))
-        stuck = float(np.sum(self.sliders(self.laws)[:, 0]))
+        stuck = float(np.sum(self.sliders([law for law in self.laws if isinstance(law, Joint) and law.sticks])[:, 0]))
         return slope * self.scale_m / (2.0 * near) + stuck, damping * self.scale_m**2
 
     @property
@@ -131,7 +131,7 @@ class Tables(NamedTuple):
     sliders: np.ndarray
     """float[n_sliders, 2]: stiffness and largest force."""
     bends: np.ndarray
-    """float[n_sliders, 3]: yield force, exponent and ratio of a hysteresis; zeros for a Jenkins slider."""
+    """float[n_sliders, 3]: yield force, exponent and ratio of a hysteresis; zeros for Jenkins, exponent -1 for dry friction."""
     first: np.ndarray
     """int[n_elements + 1]: first slider of every element."""
 

@@ -11,7 +11,10 @@ force a piece ends, after a way that is Gauss' quadrature of ``1/g``. The work i
 a step belongs to the change of the state. ``g`` is larger below zero (unloading) than above (loading) at the same ``|w|``, so
 that the work is never less than the rise of the energy ``integral of r dr/(k g(-|r|/y))`` that unloading gives back.
 
-A row of `Tables.bends` is ``[y, n, gamma]``; n is 0 for a Jenkins slider.
+Dry friction has no memory. Over a step it is ``k`` times the way, at most the largest force, with a k so large that a step that
+holds hardly moves; the work is never negative.
+
+A row of `Tables.bends` is ``[y, n, gamma]``; n is 0 for a Jenkins slider and below zero for dry friction.
 """
 
 import math
@@ -96,6 +99,10 @@ def hysteresis_step(
     Return mean force, force at the end, the derivatives of the mean by ``way`` and by ``r``, and those of the end. They follow
     from the equation, which knows x by its differential only: ``d w/d w0 = g(w)/g(w0)``.
     """
+    if n < 0.0:
+        held = abs(k * way) < largest
+        dry, by = (k * way, k) if held else (math.copysign(largest, way), 0.0)
+        return dry, dry, by, 0.0, by, 0.0
     sign = math.copysign(1.0, way)
     most = largest / y
     first = min(sign * r / y, most)

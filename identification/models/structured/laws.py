@@ -24,6 +24,9 @@ _LARGEST_SLIP = 0.9
 _LARGEST_ELASTIC = 30.0
 """Largest force of a hysteresis that hardens, as the displacement x at which the stiffness at rest would reach it. Chosen, far
 beyond the data: the bound of the motion needs one."""
+_CREEP = 1e-8
+"""Displacement x by which a step of dry friction creeps if it just holds. Chosen: little over all steps of a record, far above
+rounding."""
 _LEAST_EXPONENT = 0.75
 """Least exponent of a hysteresis. Chosen: below 1 the bend at zero force is a corner."""
 _MAGNET_REACH = 0.8
@@ -187,12 +190,18 @@ class Joint(Law):
     They stand beside the linear part, which is that of the structure with all sliders slipping.
     """
 
+    sticks: ClassVar[bool] = True
+    """Whether the joint sticks in small vibrations."""
+
     @abstractmethod
     def sliders(self) -> Float:
         """float[2, n]: stiffness (N per unit of x) and largest force (N) of each slider."""
 
     def bends(self) -> Float:
-        """float[3, n]: yield force (N), exponent and ratio gamma of each hysteresis (`hysteresis`); zeros for a slider."""
+        """float[3, n]: yield force (N), exponent and ratio gamma of each hysteresis (`hysteresis`).
+
+        Zeros for a slider; an exponent of -1 for dry friction.
+        """
         return np.zeros((3, self.sliders().shape[1]))
 
 
@@ -350,6 +359,33 @@ class Jenkins(Joint):
         return np.array([[self.stiffness_n], [self.stiffness_n * self.slip]])
 
 
+@dataclass(frozen=True, eq=False)
+class Coulomb(Joint):
+    """Dry friction: a force of one size against the motion, and any smaller one at rest.
+
+    The step of the simulation makes it a number: over a step it is the whole force against the mean velocity, or, if the
+    element would turn round, what holds it. A step that holds may creep by a hundred-millionth of the largest displacement in
+    the training data; what a model does, does not depend on it. Harmonic balance has no steps: there dry friction slips at a
+    thousandth. In small vibrations it slips: those of the linear part are of a modal test of which friction takes little.
+    """
+
+    kind = "coulomb"
+    free: ClassVar = {"friction_n": POSITIVE}
+    linear = "friction_n"
+    sticks = False
+
+    friction_n: float = 1.0
+    """Friction force, N."""
+
+    def sliders(self) -> Float:
+        """float[2, 1]: stiffness and largest force."""
+        return np.array([[self.friction_n / _CREEP], [self.friction_n]])
+
+    def bends(self) -> Float:
+        """float[3, 1]: an exponent of -1 for dry friction."""
+        return np.array([[0.0], [-1.0], [0.0]])
+
+
 def _slips(count: int, largest: float = _LARGEST_SLIP) -> tuple[float, ...]:
     """Return slips that grow with the power 1.5 of their number."""
     return tuple((largest * (np.arange(1, count + 1) / count) ** 1.5).round(4).tolist())
@@ -465,6 +501,7 @@ LAWS: dict[str, type[Law]] = {
         Iwan,
         Masing,
         BoucWen,
+        Coulomb,
     )
 }
 """All laws by their names."""

@@ -159,6 +159,15 @@ def evaluate(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, e: i
 
 
 @inner_kernel
+def is_dry(tables: Tables, e: int) -> bool:
+    """Return whether an element has dry friction."""
+    dry = False
+    for s in range(tables.first[e], tables.first[e + 1]):
+        dry = dry or tables.bends[s, 1] < 0.0
+    return dry
+
+
+@inner_kernel
 def newton(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, share: float) -> bool:
     """Correct mean velocities of all elements once, and their forces along the tangents; return whether the change is small."""
     elements = work.w.size
@@ -180,6 +189,8 @@ def newton(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, share:
             done = False
     for e in range(elements):
         change = work.change[e, 0] * (1.0 if done else share)  # the last one is taken whole
+        if not done and work.w[e] * (work.w[e] + change) < 0.0 and is_dry(system.tables, e):
+            change = -work.w[e]  # the force has a step there
         work.w[e] += change
         work.forces[e, 0] += change * work.forces[e, 2]
     return done

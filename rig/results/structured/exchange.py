@@ -36,7 +36,7 @@ _SLIDERS = (
     "slider_exponent",
     "slider_gamma",
 )
-"""Arrays of the sliders; the last three with hystereses only."""
+"""Arrays of the sliders; the last three with other joints than those of Jenkins sliders only."""
 
 
 def structured_parts(model: StructuredModel) -> Contents:
@@ -45,8 +45,8 @@ def structured_parts(model: StructuredModel) -> Contents:
     For each element, in rows: ``directions`` [element, mode], ``displacement_m``, ``spring_n``, ``damper_n_s_m`` [element,
     point]; ``spring_n`` is NaN with functions of the user, which are not imported. The sliders of all joints are in
     ``slider_element`` (from 1), ``slider_stiffness_n_m``, ``slider_strength_n``; with hystereses of Bouc and Wen
-    among them ``slider_yield_n``, ``slider_exponent`` and ``slider_gamma``, zeros for sliders of Jenkins. The laws themselves,
-    from which a file is read back, are in the attributes.
+    or dry friction among them ``slider_yield_n``, ``slider_exponent`` and ``slider_gamma``, zeros for sliders of Jenkins, and
+    an exponent of -1 for dry friction. The laws themselves, from which a file is read back, are in the attributes.
     """
     arrays, attributes = encode(model)
     out: dict[str, Any] = {**arrays, "fs": np.array([model.sample_rate_hz])}

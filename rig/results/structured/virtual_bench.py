@@ -7,6 +7,7 @@ import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredModel
 from identification.common import find_role
+from identification.models import Joint
 from rig.bench import Bench, load_bench
 from rig.bench.bench import DriverChoice
 from rig.bench.channels import Channel
@@ -232,9 +233,9 @@ def _nonlinear(model: StructuredModel, points: list[str]) -> Table:
             kept = _kept(element, damping, _FAITHFUL_DAMPING, smooth=False)
             numbers = {"deflection_m": _deflections(element, kept), "damping_n_s_m": _short(damping[kept])}
             elements.append({"kind": "damping-table", "at": at, **numbers})
-        if np.any(tables.bends[tables.first[e] : tables.first[e + 1]]):
+        if strange := [law.kind for law in element.laws if isinstance(law, Joint) and np.any(law.bends())]:
             raise IdentificationError(
-                f"{at}: has a hysteresis of Bouc and Wen, which no virtual rig has; allowed are jenkins, iwan, masing"
+                f"{at}: has {', '.join(strange)}, which no virtual rig has; allowed joints are jenkins, iwan, masing"
             )
         stiffness, strength = (tables.sliders[tables.first[e] : tables.first[e + 1]] / [scale**2, scale]).T
         some = stiffness > _LEAST_SLIDER * np.sum(stiffness)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, backbone
-from identification.models import BoucWen, Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
+from identification.models import BoucWen, Coulomb, Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
 from rig.authoring.new_files import new_file
 from rig.bench import load_bench
 from rig.bench.cross_checks import cautions
@@ -193,9 +193,10 @@ def test_a_spring_that_pushes_at_rest_is_refused():
         structured_bench(beam(elements=(element,)), load_bench("magnet-beam"))
 
 
-def test_a_hysteresis_is_refused():
-    element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(BoucWen(),))
-    with refused(IdentificationError, "element-has-a-hysteresis"):
+@pytest.mark.parametrize("law", [BoucWen(), Coulomb()])
+def test_a_joint_that_no_virtual_rig_has_is_refused(law):
+    element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(law,))
+    with refused(IdentificationError, "element-has-a-joint-of-no-rig"):
         structured_bench(beam(elements=(element,)), load_bench("magnet-beam"))
 
 
