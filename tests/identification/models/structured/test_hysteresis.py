@@ -6,7 +6,8 @@ from hypothesis import given, settings, strategies as st
 from numba import njit
 from scipy.integrate import quad, solve_ivp
 
-from identification import IdentificationError, bound_of
+from benchmarks import friction_laws as truth
+from identification import IdentificationError, bound_of, fit_structured
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.hysteresis import hysteresis_step
 from identification.models.structured.laws import BoucWen, Jenkins, PolynomialSpring
@@ -210,3 +211,23 @@ def test_numbers_that_a_hysteresis_cannot_have_are_refused():
         BoucWen(1.0, 1.0, 0.5)
     with refused(IdentificationError, "slip-is", field="bouc-wen", allowed="numbers above 0"):
         BoucWen(1.0, 0.0)
+
+
+@pytest.mark.slow
+def test_a_fit_finds_the_law_of_the_benchmark_of_noel_and_schoukens():
+    """Simulated by Wen's equation, with noise of 0.1 % of force and acceleration; beta and gamma have opposite signs."""
+    training = [truth.experiment("benchmark", 1.0, 1, truth.NOISE)]
+    fit = fit_structured(truth.modes("benchmark"), training, laws=(BoucWen(),), support=False, steps=4)
+    (element,) = fit.model.elements
+    (law,) = element.laws
+    assert fit.training_error < 1e-3
+    assert not fit.not_identified
+    moves = element.scale_m / (element.direction[0] * np.sqrt(2.0))  # of the mass of 2 kg, per x
+    assert law.gamma == pytest.approx(-1100.0 / 800.0, rel=1e-3)
+    assert law.exponent == pytest.approx(1.0, rel=5e-3)
+    assert law.slip * abs(moves) == pytest.approx(1.0 / 800.0, rel=5e-3)
+    assert law.stiffness_n / element.scale_m * element.direction[0] ** 2 * 2.0 == pytest.approx(5e4, rel=5e-3)
+    for level, largest in ((1.0, 5e-4), (2.0, 1e-3)):
+        fresh = truth.experiment("benchmark", level, 7, 0.0)
+        found = fit.model.simulate_experiment(fresh).outputs[:, fresh.counted_from :]
+        assert np.linalg.norm(found - fresh.counted_outputs) < largest * np.linalg.norm(fresh.counted_outputs)

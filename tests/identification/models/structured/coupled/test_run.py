@@ -9,7 +9,7 @@ from identification import Channel, Exciter, IdentificationError, coupled_run, s
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.laws import PolynomialDamper
 from tests.identification.models.pnlss.steady.oscillators import shaker
-from tests.identification.models.structured.steady.beams import beam, friction, smooth
+from tests.identification.models.structured.steady.beams import beam, friction, hysteresis, smooth
 from tests.refused import refused
 
 RATE_HZ, LOWEST_HZ = 2000.0, 10.0
@@ -21,7 +21,7 @@ def last_harmonics(values, samples, harmonics=5):
     return found[: harmonics + 1]
 
 
-@pytest.mark.parametrize(("make", "voltage_v"), [(smooth, 0.5), (friction, 2.0)])
+@pytest.mark.parametrize(("make", "voltage_v"), [(smooth, 0.5), (friction, 2.0), (hysteresis, 2.0)])
 def test_a_run_settles_on_the_harmonic_balance_of_the_pair(make, voltage_v):
     samples, periods = 80, 400
     model = make(rate_hz=RATE_HZ, steps=4)
