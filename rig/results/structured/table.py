@@ -19,6 +19,8 @@ _LEAST_SUPPORT_N_M = 1e-3
 
 _MISSING, _EXPLAINS = 4, 0.5
 """Forces that are listed, and the share of the squared residual from which one is named. Chosen."""
+_ALIKE = 0.5
+"""What a force may leave beyond the best one to count as alike, relative to what that leaves. Chosen."""
 
 
 _Modes = list[dict[str, float | None]]
@@ -220,7 +222,14 @@ def _missing(numbers: list[dict[str, Any]], forces: list[dict[str, Any]]) -> str
     if any(one["share"] > _EXPLAINS for one in numbers):
         return "other values of the model's own numbers, so that its fit ended in a local minimum"
     if forces and forces[0]["share"] > _EXPLAINS:
-        return f"a {forces[0]['force']} at {forces[0]['place']}"
+        best = forces[0]
+        alike = [
+            one["place"]
+            for one in forces
+            if one["force"] == best["force"] and one["share"] > best["share"] - _ALIKE * (1.0 - best["share"])
+        ]
+        among = ", which the data do not tell apart" if len(alike) > 1 else ""
+        return f"a {best['force']} at {' or '.join(alike)}{among}"
     return "no spring, damper or joint at an output or along a mode"
 
 
