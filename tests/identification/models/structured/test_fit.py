@@ -105,22 +105,25 @@ JOINT = beam(elements=(replace(ELEMENT, laws=(PolynomialSpring((3.0,)), Jenkins(
 
 
 @pytest.mark.parametrize(
-    ("true", "laws", "largest", "least"),
+    ("true", "laws", "largest", "least", "missing"),
     [
-        (TRUE, LAWS, 3.0, 0.3),
-        (JOINT, (PolynomialSpring((3.0,)), Jenkins(2.5, 0.8)), 3.0, 0.3),
-        (JOINT, LAWS, np.inf, 30.0),
-        (TRUE, (PolynomialSpring((3.0,)),), np.inf, 300.0),
+        (TRUE, LAWS, 3.0, 0.3, ""),
+        (JOINT, (PolynomialSpring((3.0,)), Jenkins(2.5, 0.8)), 3.0, 0.3, ""),
+        (JOINT, LAWS, np.inf, 30.0, "joint"),
+        (TRUE, (PolynomialSpring((3.0,)),), np.inf, 300.0, "spring"),
     ],
     ids=["cubic", "joint", "joint by a polynomial", "cubic by a linear spring"],
 )
-def test_noise_explains_the_residual_of_a_right_structure_and_not_of_a_wrong_one(true, laws, largest, least):
+def test_noise_explains_the_residual_of_a_right_structure_and_not_of_a_wrong_one(
+    true, laws, largest, least, missing
+):
     data = _periods(true, 3)
     found = fit_structured(linear_modes(true, 1), [data], support=False, laws=laws)
     ratio = simulated_run(found.model, data, steps_left=found.steps_left).over_noise
     assert np.all(ratio < largest)
     assert np.all(ratio > least)
     assert not any("jenkins" in name for name in found.not_identified)  # it slips
+    assert [one.force for one in found.missing[1:2]] == ([missing] if missing else [])
 
 
 def test_where_noise_does_not_explain_the_residual_the_fit_begins_again_elsewhere(monkeypatch):
