@@ -134,6 +134,8 @@ class Tables(NamedTuple):
     """float[n_sliders, 3]: yield force, exponent and ratio of a hysteresis; zeros for Jenkins, exponent -1 for dry friction."""
     first: np.ndarray
     """int[n_elements + 1]: first slider of every element."""
+    bent: np.ndarray
+    """bool[n_elements]: whether an element has other joints than Jenkins sliders."""
 
 
 class DerivativeTables(NamedTuple):
@@ -172,6 +174,7 @@ def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Fl
         sliders=np.concatenate([np.zeros((0, 2)), *sliders]),
         bends=np.concatenate([np.zeros((0, 3)), *(element.bends(element.laws) for element in elements)]),
         first=np.cumsum([0, *map(len, sliders)]),
+        bent=np.array([bool(np.any(element.bends(element.laws))) for element in elements], dtype=np.bool_),
     )
 
 

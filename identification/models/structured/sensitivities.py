@@ -207,7 +207,7 @@ def begin_sticking(system: System, work: Workspace, e: int, state: np.ndarray, d
     for s in range(tables.first[e], tables.first[e + 1]):
         at = 2 * n + 1 + s
         stiffness = tables.sliders[s, 0]
-        if tables.bends[s, 1] != 0.0:
+        if tables.bent[e] and tables.bends[s, 1] != 0.0:
             continue
         work.stuck[s] = jenkins_step(state[at], stiffness, tables.sliders[s, 1], system.step_s * work.w[e])[3]
         if work.stuck[s] > 0.0 and not derivatives.sticks[s]:
@@ -234,6 +234,8 @@ def of_slips(system: System, work: Workspace, e: int, derivatives: Sensitivities
 def of_hystereses(system: System, work: Workspace, e: int, state: np.ndarray, derivatives: Sensitivities) -> None:
     """Add what the forces of an element's hystereses at the beginning of a step change of their mean to ``work.dforce``."""
     n, tables, way = system.omega.size, system.tables, system.step_s * work.w[e]
+    if not tables.bent[e]:
+        return
     for s in range(tables.first[e], tables.first[e + 1]):
         bend, at = tables.bends[s], 2 * n + 1 + s
         if bend[1] != 0.0:
@@ -262,7 +264,7 @@ def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int,
         total = 0.0
         for s in range(changes.first[k], changes.last[k]):
             by, share = changes.sliders[k, s], work.stuck[s]
-            if tables.bends[s, 1] != 0.0:
+            if tables.bent[e] and tables.bends[s, 1] != 0.0:
                 r, by_bend = state[2 * system.omega.size + 1 + s], changes.bends[k, s]
                 total += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[0]
                 continue
@@ -291,7 +293,7 @@ def end_sliders(
         way = system.step_s * work.w[e]
         for s in range(changes.first[k], changes.last[k]):
             by, own = changes.sliders[k, s], derivatives.rows[2 * n + 1 + s]
-            if tables.bends[s, 1] != 0.0:
+            if tables.bent[e] and tables.bends[s, 1] != 0.0:
                 r, by_bend = state[2 * n + 1 + s], changes.bends[k, s]
                 own[column] += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[1]
             elif derivatives.sticks[s]:
@@ -309,6 +311,8 @@ def end_hystereses(
     n, h, tables = system.omega.size, system.step_s, system.tables
     for e in range(system.phi.shape[0]):
         begin, ready = 2 * n + n * system.inputs + e * n, False
+        if not tables.bent[e]:
+            continue
         for s in range(tables.first[e], tables.first[e + 1]):
             bend, at = tables.bends[s], 2 * n + 1 + s
             if bend[1] == 0.0:

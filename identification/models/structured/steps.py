@@ -18,7 +18,7 @@ import numpy as np
 
 from identification.models.structured.elements import Tables
 from identification.models.structured.hysteresis import slider_step
-from identification.models.structured.kernels import damping_at, spring_at, step_force
+from identification.models.structured.kernels import damping_at, jenkins_step, spring_at, step_force
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 NEWTON = 60  # iterations at most; a step that is not solved by then is counted
@@ -152,10 +152,19 @@ def evaluate(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, e: i
     x = dot(q, system.phi[e])
     force, by_x, by_w = step_force(x, work.w[e], h, tables.springs[e], tables.dampers[e], tables.limits[e])
     for s in range(tables.first[e], tables.first[e + 1]):
-        mean, _, by_way = slider_step(r[s], tables.sliders[s], tables.bends[s], h * work.w[e])
+        mean, _, by_way = joint_step(tables, e, s, r[s], h * work.w[e])
         force += mean
         by_w += h * by_way
     work.forces[e, 0], work.forces[e, 1], work.forces[e, 2] = force, by_x, by_w
+
+
+@inner_kernel
+def joint_step(tables: Tables, e: int, s: int, r: float, way: float) -> tuple[float, float, float]:
+    """Move a slider of an element as `slider_step` does."""
+    if tables.bent[e]:
+        return slider_step(r, tables.sliders[s], tables.bends[s], way)
+    mean, end, by_way, _ = jenkins_step(r, tables.sliders[s, 0], tables.sliders[s, 1], way)
+    return mean, end, by_way
 
 
 @inner_kernel
@@ -239,7 +248,7 @@ def end_step(system: System, work: Workspace, q: np.ndarray, v: np.ndarray, stat
     for e in range(system.phi.shape[0]):
         for s in range(tables.first[e], tables.first[e + 1]):
             at = 2 * n + 1 + s
-            state[at] = slider_step(state[at], tables.sliders[s], tables.bends[s], system.step_s * work.w[e])[1]
+            state[at] = joint_step(tables, e, s, state[at], system.step_s * work.w[e])[1]
     for i in range(q.size):
         there += system.b[i, 0] * (q[i] + 0.5 * system.step_s * work.mean[i])
         q[i] += system.step_s * work.mean[i]

@@ -89,6 +89,7 @@ def one_mode(stiffness, damper, step_s=0.01, omega=100.0, zeta=0.2):
         sliders=np.zeros((0, 2)),
         bends=np.zeros((0, 3)),
         first=np.zeros(2, int),
+        bent=np.zeros(1, bool),
     )
     one = np.ones((1, 1))
     return System(step_s, 1, omega * one[0], zeta * one[0], one, 1, one, tables, np.zeros(3))
