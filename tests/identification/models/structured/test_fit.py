@@ -114,9 +114,7 @@ JOINT = beam(elements=(replace(ELEMENT, laws=(PolynomialSpring((3.0,)), Jenkins(
     ],
     ids=["cubic", "joint", "joint by a polynomial", "cubic by a linear spring"],
 )
-def test_noise_explains_the_residual_of_a_right_structure_and_not_of_a_wrong_one(
-    true, laws, largest, least, missing
-):
+def test_noise_explains_the_residual_of_a_right_structure_and_not_of_a_wrong_one(true, laws, largest, least, missing):
     data = _periods(true, 3)
     found = fit_structured(linear_modes(true, 1), [data], support=False, laws=laws)
     ratio = simulated_run(found.model, data, steps_left=found.steps_left).over_noise
