@@ -52,8 +52,16 @@ class ElementPlan:
 
     @property
     def name(self) -> str:
-        """Kinds of its laws and where it acts, as in ``jenkins@tip:drive``."""
-        return ",".join(law.kind for law in self.laws) + ("@" if self.between else "") + ":".join(self.between)
+        """Its laws and where it acts, as in ``jenkins@tip:drive``."""
+        return names_of(self.laws) + ("@" if self.between else "") + ":".join(self.between)
+
+
+def names_of(laws: Sequence[Law]) -> str:
+    """Return kinds of laws, with the side of a stop that is not above, as in ``stop below,jenkins``."""
+    sides = [getattr(law, "sides", "above") for law in laws]
+    return ",".join(
+        law.kind if side == "above" else f"{law.kind} {side}" for law, side in zip(laws, sides, strict=True)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +83,7 @@ class ElementTrial:
         Kinds of laws and outputs of the element that was added (of a pair the last one) or left out.
     elements
         The model's elements, with kinds of laws and places as in ``jenkins@tip:drive``, in its order; empty in earlier files.
+        Where laws were chosen, ``linear`` for the model without an element.
     compared
         Elements of the model with which it is compared; empty if with none.
     error
@@ -90,6 +99,11 @@ class ElementTrial:
         (`identification.experiments.residuals.log_likelihood_ratio`); NaN where the noise is unknown.
     kept
         Whether the elements were kept then: added if they pay, left out if they do not.
+    regression, screening
+        Where laws were chosen: what the regression leaves of what it leaves without an element, and the relative error of a
+        short fit to the loudest experiment, led by the measured motion; NaN where it was not needed.
+    over_noise
+        Where laws were chosen: largest residual over noise in the validation data; NaN where the noise is unknown.
     """
 
     laws: tuple[str, ...]
@@ -101,6 +115,9 @@ class ElementTrial:
     at_least: float
     likelihood: float = math.nan
     kept: bool
+    regression: float = math.nan
+    screening: float = math.nan
+    over_noise: float = math.nan
 
 
 class Scores(NamedTuple):
@@ -134,6 +151,14 @@ class Scores(NamedTuple):
     def rms(self) -> float:
         """RMS of the errors."""
         return float(np.sqrt(np.mean(self.errors**2)))
+
+    @property
+    def over_noise(self) -> Float:
+        """float[n_experiments, n_outputs], RMS of the residual over that of the noise; NaN where it is not known."""
+        if self.residuals is None:
+            return np.full((self.errors.size, 1), np.nan)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.sqrt(self.residuals.residual / self.residuals.noise))
 
     def gain_over(self, other: "Scores") -> float:
         """Return the factor by which errors are smaller than those of another model."""

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -12,8 +13,11 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band, same_channels
 from identification.fitting.result import FitProgress, FitResult
 from identification.linear.modes import LinearModes
+from identification.models.structured.candidates import AUTO
 from identification.models.structured.element_trials import ElementPlan, ElementTrial
 from identification.models.structured.identified import FittedNumber, fitted_numbers
+from identification.models.structured.law_choice import USUAL_CHOICE, choose_law
+from identification.models.structured.law_fits import ModelFits
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.missing import MissingForce
 from identification.models.structured.model import StructuredModel
@@ -97,7 +101,8 @@ def fit_structured(
     modes: LinearModes,
     experiments: Sequence[Experiment],
     *,
-    laws: Sequence[Law] = (PolynomialSpring(), PolynomialDamper()),
+    laws: Sequence[Law] | Literal["auto"] = (PolynomialSpring(), PolynomialDamper()),
+    between: Sequence[str] = (),
     elements: Sequence[ElementPlan] = (),
     validation: Sequence[Experiment] = (),
     reach: float = 3.0,
@@ -121,7 +126,11 @@ def fit_structured(
         Training data with one force as input; one at least is periodic. All are simulated from rest.
     laws
         Laws of the element (`laws`): what they declare as linear and as tried gets initial values
-        from the data.
+        from the data. ``"auto"``: they are chosen by the validation data
+        (`identification.models.structured.law_choice.choose_law`), in two to three times the time of one fit; the result may
+        have no element. `trials` of the result has all that was tried.
+    between
+        Outputs between which, or at which, the element with ``laws`` acts, as in `ElementPlan`; empty: it is found.
     elements
         Elements in place of the one with ``laws``; their order does not matter. With n of them n (n + 1) / 2 to n^2 models
         are usually fitted, each with all its numbers (`trials` of the result).
@@ -157,15 +166,16 @@ def fit_structured(
         band = excited_band(experiments)
         steps = _LEAST if band is None else max(_LEAST, math.ceil(_PER_PERIOD * band[1] / first.sample_rate_hz))
     IdentificationError.unless_at_least("steps", steps, 1)
-    wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
+    wanted = _wanted(laws, tuple(between), elements, validation)
     linear = linear_start(modes, first, steps)
     linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
     known = 0.0 if isinstance(support, bool) else float(support)
     if not 0.0 <= known < math.inf:
         raise IdentificationError(f"is {known:g} N/m", field="support", allowed="0 or above, True or False")
-    for plan in wanted:
-        linear.output_selector(plan.between)  # refused here, not after the fits of others
+    for at in (between, *(plan.between for plan in wanted)):
+        linear.output_selector(tuple(at))  # refused here, not after the fits of others
+    watch = FitWatch(progress, usual_fits(len(wanted)) if wanted else USUAL_CHOICE, EVALUATIONS)
     fits = ElementFits(
         modes,
         experiments,
@@ -173,11 +183,13 @@ def fit_structured(
         replace(linear, support_largest_n=largest, support_n_m=known),
         reach=reach,
         support=support is True,
-        alone=len(wanted) == 1,
-        watch=FitWatch(progress, usual_fits(len(wanted)), EVALUATIONS),
+        alone=len(wanted) <= 1,
+        watch=watch,
     )
-
-    kept, trials = select_elements(wanted, fits, selective=bool(validation))
+    if wanted:
+        kept, trials = select_elements(wanted, fits, selective=bool(validation))
+    else:
+        kept, trials = choose_law(ModelFits(fits, tuple(between), watch), tuple(between))
     covariance, steps_left, unseen = kept.problem.uncertainty(kept.last.vector)
     return StructuredFit(
         model=kept.model.trained_with(experiments),
@@ -196,6 +208,30 @@ def fit_structured(
         missing=fits.missing(kept),
         unseen=tuple(name for name, one in zip(kept.problem.parameters.names, unseen, strict=True) if one),
     )
+
+
+def _wanted(
+    laws: Sequence[Law] | str,
+    between: tuple[str, ...],
+    elements: Sequence[ElementPlan],
+    validation: Sequence[Experiment],
+) -> tuple[ElementPlan, ...]:
+    """Return the elements, none where a law is chosen."""
+    if elements and (between or isinstance(laws, str)):
+        name, value = ("between", between) if between else ("laws", laws)
+        raise IdentificationError(
+            field=name, value=value, allowed="nothing beside `elements`, each of which has its own"
+        )
+    if not isinstance(laws, str):
+        return tuple(elements) or (ElementPlan(tuple(laws), between),)
+    if laws != AUTO:
+        raise IdentificationError(field="laws", value=laws, allowed=f"laws, or '{AUTO}'")
+    ElementPlan(between=between)  # is refused with more than two outputs
+    if not validation:
+        raise IdentificationError(
+            "are none", field="validation", allowed=f"one at least with laws='{AUTO}': they decide"
+        )
+    return ()
 
 
 def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> Float:

@@ -191,10 +191,10 @@ class Problem:
         self._left[vector.tobytes()] = left
         return left + float(np.sum((self._misfit * self._test.left(vector)) ** 2))
 
-    def solve(self, vector: Float, tolerance: float) -> Minimum:
+    def solve(self, vector: Float, tolerance: float, evaluations: int = EVALUATIONS) -> Minimum:
         """Return the minimum; iterations end when one gains and promises less than ``tolerance`` of the cost."""
         bounds = self.parameters.bounds(vector)
-        found = bounded_minimum(self.triangle, self._cost, vector, bounds, tolerance, EVALUATIONS)
+        found = bounded_minimum(self.triangle, self._cost, vector, bounds, tolerance, evaluations)
         if found.ending.status is FitStatus.INTERRUPTED:
             raise KeyboardInterrupt
         return found

@@ -17,25 +17,27 @@ class FitWatch:
 
     def __init__(self, progress: Callable[[FitProgress], None] | None, fits: tuple[int, int], iterations: int) -> None:
         self._progress, self._fits, self._iterations = progress, fits, iterations
-        self._fit = 0
+        self._fit, self._what = 0, ""
         self._began_s = time.perf_counter()
-        self._stage, self._iteration, self._seen = "", 0, 0
+        self._stage, self._iteration, self._seen, self._short = "", 0, 0, False
 
-    def begin_fit(self) -> None:
-        """Note that a fit begins."""
-        self._fit += 1
+    def begin_fit(self, what: str = "") -> None:
+        """Note that a fit begins, and of what."""
+        self._fit, self._what = self._fit + 1, what
 
-    def begin(self, stage: str) -> None:
-        """Note that a stage begins."""
+    def begin(self, stage: str, short: bool = False) -> None:
+        """Note that a stage begins, or a short fit, whose time tells nothing of that of a whole one."""
+        self._short = short
         least, most = self._fits
-        fit = f"fit {self._fit} of {least} to {most}, " if most > 1 else ""
-        self._stage, self._iteration = fit + stage, 0
+        fit = f"fit {self._fit} of {least} to {most}, " if most > 1 and self._fit else ""
+        law = f"{self._what}, " if self._what else ""
+        self._stage, self._iteration = fit + law + stage, 0
 
     def linearised(self, error: float, took_s: float) -> None:
         """Note a linearisation: the relative error before it, and how long it took."""
-        self._seen += 1
+        self._seen += not self._short
         if self._progress is not None:
-            timed = self._seen == _FIRST_LINEARISATIONS
+            timed = self._seen == _FIRST_LINEARISATIONS and not self._short
             self._progress(
                 FitProgress(
                     iteration=self._iteration,

@@ -54,9 +54,9 @@ def bounded_regression(laws: Sequence[Law], columns: Float, right: Float) -> tup
     """
     from scipy.optimize import lsq_linear  # only on use: it takes long to load
 
-    sizes = [law.n_linear for law in laws]
+    sizes = np.array([law.n_linear for law in laws], dtype=int)
     least = np.full(columns.shape[1], -np.inf)
-    least[: sum(sizes)] = np.repeat([law.least_linear for law in laws], sizes)
+    least[: sizes.sum()] = np.repeat([law.least_linear for law in laws], sizes)
     scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     bounds = (least, np.full(least.size, np.inf))
     numbers = lsq_linear(columns / scale, right, bounds=bounds, method="bvls").x / scale

@@ -1,6 +1,5 @@
 """The fit of one structured model: from its starts, each in stages with smaller and smaller nudging forces."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,13 +14,15 @@ from identification.fitting.levenberg_marquardt import Minimum
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan, Scores
+from identification.models.structured.laws import Law
 from identification.models.structured.missing import MissingForce, missing_forces
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
-from identification.models.structured.parameters import HIGHEST, Parameters
+from identification.models.structured.parameters import Parameters
 from identification.models.structured.problem import ModalTest, Problem
 from identification.models.structured.progress import FitWatch
-from identification.models.structured.start import element_starts, with_further_element
+from identification.models.structured.screening import Screening, rough_steps
+from identification.models.structured.start import Start, element_starts, with_further_element
 
 _ROUGH, _FINE = 3e-2, 2e-4
 """Relative gains of a step below which the fits before the last one, and the last one, end."""
@@ -131,9 +132,9 @@ class ElementFits:
         self._watch.begin_fit()
         found = self._linear if before is None else before.model
         for plan in plans[:-1]:
-            found = self._starts_with(found, plan)[0]
-        starts = self._starts_with(found, plans[-1])
-        return self._counted(best_fitted(starts[: self._starts], self._from))
+            found = self._starts_with(found, plan.laws, plan.between)[0].model
+        starts = self._starts_with(found, plans[-1].laws, plans[-1].between)
+        return self.begun([one.model for one in starts[: self._starts]])
 
     def less(self, larger: Fitted, position: int) -> Fitted:
         """Return the fit without the element at a position, from a fit that has it."""
@@ -159,11 +160,29 @@ class ElementFits:
         self.iterations += fitted.iterations
         return fitted
 
-    def _starts_with(self, model: StructuredModel, plan: ElementPlan) -> list[StructuredModel]:
-        if model.elements or plan.between:
-            return [with_further_element(model, self._experiments, self._nudged, plan, self._reach)]
-        with threads():  # its matrices are too small to share
-            return element_starts(model, self._experiments, self._nudged, plan.laws, self._reach)
+    def starts(self, laws: Sequence[Law], between: tuple[str, ...], held: int = 0) -> list[Start]:
+        """Return the starts of a model with one element, or with none without laws, the best first.
+
+        The first ``held`` laws keep the numbers in which they are not linear.
+        """
+        return self._starts_with(self._linear, laws, between, held)
+
+    def begun(self, starts: Sequence[StructuredModel]) -> Fitted:
+        """Return the best of the fits from these starts, up to the first whose residual the noise explains."""
+        return self._counted(best_fitted(starts, self._from))
+
+    def screening(self) -> Screening:
+        """Return short fits to one experiment."""
+        return Screening(self._modes, self._experiments, self._linear, self._nudged, self._watch)
+
+    def _starts_with(
+        self, model: StructuredModel, laws: Sequence[Law], between: tuple[str, ...], held: int = 0
+    ) -> list[Start]:
+        with threads():  # the matrices are too small to share
+            if model.elements or between:
+                found = with_further_element(model, self._experiments, self._nudged, laws, between, self._reach, held)
+                return [found]
+            return element_starts(model, self._experiments, self._nudged, laws, self._reach, held)
 
     def _from(self, start: StructuredModel) -> Fitted:
         return _fitted(start, self._linear, self._modes, self._experiments, self._nudged, self._support, self._watch)
@@ -188,9 +207,7 @@ def _fitted(
     found, evaluations, iterations, misfit = start, 0, 0, _MISFIT
     seen = float(linear.frequency_hz[-1]) < 0.5 * linear.sample_rate_hz  # the last may be the residual's
     poles = len(linear.frequency_hz if seen else modes.frequency_hz)
-    # fits before the last one take half of the steps, as long as every mode may rise by a fifth
-    needed = 1.2 * float(np.max(start.frequency_hz)) / (HIGHEST * start.sample_rate_hz)
-    rough = min(start.steps, max(math.ceil(0.5 * start.steps), math.ceil(needed)))
+    rough = rough_steps(start)
     slowest = float(np.min((linear.omega * linear.damping_ratio)[:nudged]))
     for number, (ratio, free, turned) in enumerate(_STAGES[support], 1):
         watch.begin(f"stage {number} of {len(_STAGES[support])}")

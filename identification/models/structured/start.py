@@ -1,7 +1,8 @@
 """Initial values of a structured model: modes from a modal test, and linear regressions for the nonlinear elements."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.fitting.bounded_steps import qr_r
 from identification.linear.modes import LinearModes
-from identification.models.structured.element_trials import ElementPlan
 from identification.models.structured.laws import Damper, Joint, Law, Spring
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import LOWEST, modal_spectra
@@ -65,21 +65,32 @@ def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> Stru
     )
 
 
+class Start(NamedTuple):
+    """A model with which a fit may begin."""
+
+    model: StructuredModel
+    residual: float
+    """Norm of what its regression leaves; comparable between laws on the same data."""
+
+
 def element_starts(
     linear: StructuredModel,
     experiments: Sequence[Experiment],
     measured_modes: int,
     laws: Sequence[Law],
     reach: float,
-) -> list[StructuredModel]:
+    held: int = 0,
+) -> list[Start]:
     """Add an element along the mode that moves most: what is left of its equation of motion, by linear least squares.
 
     The modal coordinates of the periodic experiments come from their spectra. Sensors of acceleration do not show the mean
     position. A shift of it changes the coefficients of a polynomial, not the forces, so that the lines do not determine it.
     Static balance does: without a mean input the mean of mode and element is zero. Numbers in which a law is not linear are
     tried (`Law.tried`). Returned are the combinations with the least residual for each value of the first of these numbers,
-    such as the slip of a joint, the least first: the regression does not always rank them as a fit does. Mean positions in
-    balance beyond the largest RMS are not found. Raises `IdentificationError` if no experiment is periodic.
+    such as the slip of a joint, the least first: the regression does not always rank them as a fit does. The first ``held``
+    laws keep the numbers in which they are not linear. Mean positions in balance beyond the largest RMS are not found. Without
+    laws it is the model itself, and what is left without an element.
+    Raises `IdentificationError` if no experiment is periodic.
     """
     periodic = periodic_of(experiments)
     coordinates = [modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
@@ -95,14 +106,20 @@ def element_starts(
     places = _POSITIONS * float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
     found = [
         _regression(parts, list(tried), places, linear.omega[mode], (shape, scale))
-        for tried in product(*(law.candidates() for law in laws))
+        for tried in _combinations(laws, held)
     ]
+    if not laws:
+        return [Start(linear, found[0].residual)]
     direction = np.zeros(len(linear.omega))
     direction[mode] = shape
     best = dict[tuple[float, ...], Regression]()
     for one in sorted(found, key=lambda one: one.residual):
         best.setdefault(tuple(getattr(law, next(iter(law.tried))) for law in one.laws if law.tried), one)
-    return [with_regression(linear, one, [mode], reach, (direction, ())) for one in best.values()]
+    return [Start(with_regression(linear, one, [mode], reach, (direction, ())), one.residual) for one in best.values()]
+
+
+def _combinations(laws: Sequence[Law], held: int) -> Iterator[tuple[Law, ...]]:
+    return product(*([law] if number < held else law.candidates() for number, law in enumerate(laws)))
 
 
 def periodic_of(experiments: Sequence[Experiment]) -> list[Experiment]:
@@ -145,7 +162,7 @@ class _Equation:
         left = linear.input_shapes[mode] @ inputs - dynamic * coordinates[mode]
         self.left, self.phi, self.q = left[self.lines], phi, q
         self.rate = np.fft.irfft(1j * omega * coordinates[mode], q.size) * q.size
-        self._joints: dict[Law, Complex] = {}
+        self._known: dict[tuple[Law, float], Complex] = {}
         self.own = self._spectra([self.q, self.rate])
 
     def columns(self, law: Law, position: float) -> Complex:
@@ -153,13 +170,11 @@ class _Equation:
 
         A joint's do not depend on the position.
         """
-        if law not in self._joints:
+        at = (law, 0.0 if isinstance(law, Joint) else position)
+        if at not in self._known:
             x = self.phi * (self.q + position)
-            found = self._spectra([law_force(one, x, self.phi * self.rate) for one in law.basis()])
-            if not isinstance(law, Joint):
-                return found
-            self._joints[law] = found
-        return self._joints[law]
+            self._known[at] = self._spectra([law_force(one, x, self.phi * self.rate) for one in law.basis()])
+        return self._known[at]
 
     def _spectra(self, signals: list[Float]) -> Complex:
         kept = np.append(0, np.flatnonzero(self.lines))
@@ -198,29 +213,38 @@ def _regression(
 
 
 def with_further_element(
-    model: StructuredModel, experiments: Sequence[Experiment], measured_modes: int, plan: ElementPlan, reach: float
-) -> StructuredModel:
+    model: StructuredModel,
+    experiments: Sequence[Experiment],
+    measured_modes: int,
+    laws: Sequence[Law],
+    between: tuple[str, ...],
+    reach: float,
+    held: int = 0,
+) -> Start:
     """Add an element by linear least squares on what is left of the equations of motion of the measured modes.
 
     Coordinates come from the spectra of the periodic experiments, their means from a simulation. Each mode counts by its
-    receptance, so that the residual is that of the outputs. Directions are those between the channels of the plan, or tried:
+    receptance, so that the residual is that of the outputs. Directions are those between the channels given, or tried:
     along every mode, between any two of them, and at every output. Numbers in which a law is not linear are tried
-    (`Law.tried`).
+    (`Law.tried`), but those of the first ``held`` laws. Without laws it is the model itself, and what is left without a further
+    element.
     """
     parts = [ModalMotion(model, one, measured_modes) for one in periodic_of(experiments)]
     shapes = model.output_shapes[:, :measured_modes]
-    directions = [model.output_selector(plan.between) @ shapes] if plan.between else _directions(shapes)
+    directions = [model.output_selector(between) @ shapes] if between else _directions(shapes)
     found = [
         _regression_of_modes(parts, direction, list(tried))
         for direction in directions
-        for tried in product(*(law.candidates() for law in plan.laws))
+        for tried in _combinations(laws, held)
     ]
     best = min(found, key=lambda one: one.residual)
+    if not laws:
+        return Start(model, best.residual)
     direction = np.zeros(len(model.omega))
     direction[:measured_modes] = best.direction
-    if plan.between:
-        direction = model.output_selector(plan.between) @ model.output_shapes
-    return with_regression(model, best, range(measured_modes), reach, (direction, plan.between))
+    if between:
+        direction = model.output_selector(between) @ model.output_shapes
+    return Start(with_regression(model, best, range(measured_modes), reach, (direction, between)), best.residual)
 
 
 def _directions(shapes: Float) -> list[Float]:

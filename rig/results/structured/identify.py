@@ -40,7 +40,7 @@ def identify(
             found,
             training,
             validation=validation,
-            elements=options.elements(),
+            **options.arguments(),
             support=True if known is None else known,
             progress=progress,
         ),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
+from identification.experiments import lacks_something
 from identification.models import FittedNumber, Joint, std_of
 from rig.results.kind import Table
 from rig.results.simulated.table import say_errors, say_scatter, summary_of
@@ -131,8 +132,18 @@ def _say(summary: dict[str, Any]) -> None:
     if summary["linear_part"] is not None:
         print("fitted linear part, all joints slipping" if summary["joints"] else "fitted linear part")
         _say_modes(summary["linear_part"])
-    print("elements")
+    print("elements" if summary["elements"] else "no element: a linear structure")
     modes = len(summary["modes"] or summary["linear_part"])
+    if summary["elements"]:
+        _say_elements(summary["elements"], modes)
+    _say_trials([] if summary["fit"] is None else summary["fit"]["trials"])
+    _say_missing([] if summary["fit"] is None else summary["fit"]["missing"])
+    _say_numbers(summary)
+    say_scatter(summary["scatter"])
+    say_errors(summary)
+
+
+def _say_elements(elements: list[dict[str, Any]], modes: int) -> None:
     print_rows(
         [
             {
@@ -141,7 +152,7 @@ def _say(summary: dict[str, Any]) -> None:
                 "named": ", ".join(law["kind"] for law in element["laws"]),
                 **{str(i): value for i, value in enumerate(element["direction"])},
             }
-            for index, element in enumerate(summary["elements"], 1)
+            for index, element in enumerate(elements, 1)
         ],
         Column("number", "element"),
         Column("named", "laws"),
@@ -149,11 +160,6 @@ def _say(summary: dict[str, Any]) -> None:
         Column("reach_m", "reach", "mm", ".4f", 1e3),
         *(Column(str(i), f"direction {i + 1}", "", ".4f") for i in range(modes)),
     )
-    _say_trials([] if summary["fit"] is None else summary["fit"]["trials"])
-    _say_missing([] if summary["fit"] is None else summary["fit"]["missing"])
-    _say_numbers(summary)
-    say_scatter(summary["scatter"])
-    say_errors(summary)
 
 
 def _say_numbers(summary: dict[str, Any]) -> None:
@@ -180,7 +186,13 @@ def _say_numbers(summary: dict[str, Any]) -> None:
 def _say_trials(trials: list[dict[str, Any]]) -> None:
     if len(trials) < 2 or not any(np.isfinite(trial["error"]) for trial in trials):
         return
-    print(f"models that were fitted, {len(trials)}, by the elements that they have")
+    chosen = any(np.isfinite(trial["regression"]) for trial in trials)
+    what = (
+        f"laws that were tried, {len(trials)}"
+        if chosen
+        else f"models that were fitted, {len(trials)}, by the elements that they have"
+    )
+    print(what)
     print_rows(
         [
             {
@@ -191,13 +203,22 @@ def _say_trials(trials: list[dict[str, Any]]) -> None:
             }
             for trial in trials
         ],
-        Column("has", "elements"),
+        Column("has", "laws" if chosen else "elements"),
+        *([Column("regression", "left by regression", "%", ".3g", 100.0)] if chosen else []),
+        *([Column("screening", "short fit", "%", ".3g", 100.0)] if chosen else []),
         Column("error", "error in validation", "%", ".4g", 100.0),
+        *([Column("over_noise", "residual/noise", "", ".3g")] if chosen else []),
         Column("gain", "times smaller", "", ".3g"),
         Column("than", "than with"),
         Column("likelihood", "log-likelihood ratio", "", ".3g"),
         Column("verdict", "then"),
     )
+    best = next(trial for trial in reversed(trials) if trial["kept"])
+    if chosen and lacks_something(best["over_noise"], best["error"]):
+        print(
+            f"none of these laws explains the data: the best leaves {number(best['error'], '.3g', 100.0)} % in validation, "
+            f"{number(best['over_noise'], '.3g')} times the noise; try further elements, or laws that are not in the list"
+        )
 
 
 def _say_missing(missing: list[dict[str, Any]]) -> None:

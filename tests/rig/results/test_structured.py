@@ -2,7 +2,7 @@
 
 import json
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import h5py
@@ -122,7 +122,7 @@ def test_models_that_a_selection_fitted_are_listed_in_their_order(there, recordi
         ),
     )
     save(replace(found, fit=replace(found.fit, trials=trials)), recordings / "selected.h5")
-    assert load(recordings / "selected.h5").fit.trials[2] == trials[2]
+    np.testing.assert_equal(asdict(load(recordings / "selected.h5").fit.trials[2]), asdict(trials[2]))
     said = there("show selected.h5").out.splitlines()
     at = said.index("models that were fitted, 3, by the elements that they have")
     assert [line.split() for line in said[at + 2 : at + 5]] == [
@@ -160,6 +160,36 @@ def test_what_would_explain_the_residual_is_named(there, recordings, numbers, sh
         *(["drive", f"{10.0 / k:.1f}"] for k in range(1, 3)),
     ]
     assert "what would explain" not in there("show S.h5").out
+
+
+def test_laws_that_were_tried_are_listed_and_it_is_said_if_none_explains_the_data(there, recordings):
+    found = load(recordings / "S.h5")
+    of = {"between": (), "at_least": np.nan, "gain": np.nan}
+    tried = {"laws": ("stop",), "elements": ("stop below",), "regression": 0.5, "screening": 0.25}
+    best = ElementTrial(**of, **tried, error=0.05, over_noise=40.0, kept=True)
+    others = (
+        ElementTrial(**of, laws=(), elements=("linear",), regression=1.0, screening=0.5, error=np.nan, kept=False),
+        ElementTrial(**of, laws=("jenkins",), elements=("jenkins",), regression=0.99, error=np.nan, kept=False),
+    )
+    for name, first in (("wrong", best), ("right", replace(best, over_noise=1.5))):
+        fit = replace(found.fit, trials=(first, *others))
+        save(replace(found, fit=fit), recordings / f"{name}.h5")
+    said = there("show wrong.h5").out.splitlines()
+    at = said.index("laws that were tried, 3")
+    assert [line.split() for line in said[at + 2 : at + 5]] == [
+        ["stop", "below", "50", "25", "5", "40", "-", "-", "-", "kept"],
+        ["linear", "100", "50", "-", "-", "-", "-", "-", "-"],
+        ["jenkins", "99", "-", "-", "-", "-", "-", "-", "-"],
+    ]
+    assert said[at + 5].startswith("none of these laws explains the data: the best leaves 5 % in validation, 40 times")
+    assert "none of these laws" not in there("show right.h5").out
+
+
+def test_a_model_without_an_element_is_shown_and_drawn(there, recordings):
+    found = load(recordings / "S.h5")
+    save(IdentifiedStructured(model=replace(found.model, elements=()), runs=found.runs), recordings / "linear.h5")
+    assert "no element: a linear structure" in there("show linear.h5").out
+    there("plot linear.h5 -o linear.png")
 
 
 def test_numbers_that_the_data_do_not_tell_are_said_to_be_not_identified(there, recordings):
@@ -387,6 +417,11 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
         assert f"`{name}`" in page
 
 
+def test_laws_are_chosen_at_a_place():
+    options = StructuredOptions(modes="m.h5", laws=("auto @ drive : base",))
+    assert options.arguments() == {"laws": "auto", "between": ("drive", "base")}
+
+
 @pytest.mark.parametrize(
     ("place", "between"), [("", ()), ("@drive", ("drive",)), ("@ drive : base", ("drive", "base"))]
 )
@@ -435,6 +470,26 @@ def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
         (
             "identify lines.h5 --model structured --modes modes.h5 --laws iwan@drive:drive",
             "--laws = 'iwan@drive:drive': after @ allowed is an output, or two with a colon",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws auto,stop",
+            "--laws = 'auto,stop': auto is allowed alone, for one element",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws auto --laws stop",
+            "--laws = 'auto, stop': auto is allowed alone, for one element",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws auto@drive:drive",
+            "--laws = 'auto@drive:drive': after @ allowed is an output, or two with a colon",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws auto --scatter gain",
+            "--laws = 'auto': not with",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws auto --hold-out 0",
+            "--validation: are none; allowed: one at least with laws='auto'",
         ),
         (
             "identify lines.h5 --model structured --modes modes.h5 --laws iwan@nowhere",

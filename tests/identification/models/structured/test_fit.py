@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification import Channel, IdentificationError
+from identification import Channel, ElementPlan, IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.models.simulated_runs import simulated_run
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.fit import fit_structured
-from identification.models.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring
+from identification.models.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring, Stop
 from identification.models.structured.parameters import Parameters
 from identification.models.structured.stages import best_fitted
 from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
@@ -271,3 +271,43 @@ def test_the_motion_before_the_counted_samples_does_not_matter_and_the_minimum_i
     assert found.training_error == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-2)
     cosines = jacobian.T @ residual / (np.linalg.norm(jacobian, axis=0) * np.linalg.norm(residual))
     assert np.max(np.abs(cosines)) < 0.05
+
+
+def _chosen(true):
+    """Choose by two realisations."""
+    return fit_structured(
+        linear_modes(true, 1), [_periods(true, 3)], validation=[_periods(true, 5)], support=False, laws="auto"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "chosen"),
+    [(Stop(10.0, 0.4, "below"), "stop below"), (Jenkins(3.0, 1.0), "jenkins"), (None, "linear")],
+    ids=["stop below", "jenkins", "linear"],
+)
+def test_the_law_of_a_structure_is_chosen_by_data_that_were_held_out(law, chosen):
+    true = beam(elements=() if law is None else (replace(ELEMENT, laws=(law,)),), support_n_m=0.0)
+    found = _chosen(true)
+    assert [trial.elements for trial in found.trials if trial.kept][-1] == (chosen,)
+    assert [type(one) for element in found.model.elements for one in element.laws] == [type(law)] * (law is not None)
+    assert found.training_error < 3e-3
+    assert {"linear", "stop", "stop both", "iwan", "masing", "magnet"} <= {trial.elements[0] for trial in found.trials}
+    fitted = [trial for trial in found.trials if np.isfinite(trial.error)]
+    assert fitted[-1].over_noise < 3.0
+
+
+def test_laws_that_cannot_be_chosen_are_refused():
+    modes, data = linear_modes(TRUE, 1), [experiment()]
+    with refused(IdentificationError, field="validation", allowed="one at least with laws='auto': they decide"):
+        fit_structured(modes, data, laws="auto")
+    with refused(IdentificationError, field="laws", value="magic", allowed="laws, or 'auto'"):
+        fit_structured(modes, data, laws="magic")
+    alone = "nothing beside `elements`, each of which has its own"
+    elements = (ElementPlan(),)
+    with refused(IdentificationError, field="laws", value="auto", allowed=alone):
+        fit_structured(modes, data, laws="auto", elements=elements, validation=data)
+    with refused(IdentificationError, field="between", value=("tip",), allowed=alone):
+        fit_structured(modes, data, between=("tip",), elements=elements)
+    with refused(IdentificationError, field="between", allowed="one or two different outputs"):
+        fit_structured(modes, data, laws="auto", between=("tip", "tip"), validation=data)

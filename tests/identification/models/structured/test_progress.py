@@ -44,3 +44,20 @@ def test_of_several_fits_the_stage_says_which():
         watch.begin("stage 1 of 4")
         watch.linearised(0.5, 1.0)
     assert [at.stage for at in seen] == ["fit 1 of 3 to 4, stage 1 of 4", "fit 2 of 3 to 4, stage 1 of 4"]
+
+
+def test_of_laws_that_are_tried_the_stage_says_which():
+    seen: list[FitProgress] = []
+    watch = FitWatch(seen.append, fits=(1, 3), iterations=100)
+    watch.begin("short fit of stop below", short=True)
+    for _ in range(3):
+        watch.linearised(0.5, 0.01)
+    watch.begin_fit("stop below")
+    watch.begin("stage 1 of 4")
+    watch.linearised(0.5, 1.0)
+    watch.linearised(0.5, 1.0)
+    assert [at.stage for at in seen] == [
+        *["short fit of stop below"] * 3,
+        *["fit 1 of 1 to 3, stop below, stage 1 of 4"] * 2,
+    ]
+    assert [at.usual_s for at in seen] == [*[None] * 4, (30.0, 360.0)]  # that of the whole fit alone
