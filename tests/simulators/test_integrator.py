@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import quad_vec
@@ -5,6 +7,7 @@ from scipy.linalg import expm
 
 from simulators.plant.compilation import phi_matrices
 from simulators.simulation import Simulation
+from tests.sharing import made_once, shared_folder
 from tests.simulators.references import EquationsOfMotion, ideal
 
 DT_S = 1 / 5000
@@ -25,7 +28,11 @@ def errors(request: pytest.FixtureRequest) -> tuple[str, dict[int, float], float
     specimen = request.param
     voltages = square_wave(specimen)
     equations = EquationsOfMotion(ideal(specimen, friction=()))
-    states = equations.solve(voltages, DT_S)
+
+    def solve(folder: Path) -> None:
+        np.save(folder / "states.npy", equations.solve(voltages, DT_S))
+
+    states = np.load(made_once(shared_folder() / f"states-of-{specimen}", solve) / "states.npy")
     force_n = np.array([equations.stinger_force_n(x) for x in states])
     largest = np.max(np.abs(states[:, :4] @ equations.rows[0])) / equations.elements[0].gap_m
     result = {}

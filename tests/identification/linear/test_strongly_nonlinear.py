@@ -21,13 +21,17 @@ from tests.identification.linear.hardening import (
     spectra,
 )
 from tests.refused import refused
+from tests.sharing import made_once, shared_folder
 
 MANY = 240
 
 
 @cache
 def simulated(level):
-    return spectra(level, MANY, 1)
+    def make(folder):
+        np.save(folder / "spectra.npy", spectra(level, MANY, 1))
+
+    return tuple(np.load(made_once(shared_folder() / f"hardening-{level}", make) / "spectra.npy"))
 
 
 def some(level, realisations, number):

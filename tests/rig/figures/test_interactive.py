@@ -216,11 +216,11 @@ def test_a_file_of_others_is_not_replaced(recordings, tmp_path):
     figure = tmp_path / "mine.html"
     figure.write_text("<p>notes</p>")
     with pytest.raises(RecordingError, match="exists already and is not a figure of this program"):
-        plot(recordings["sweep"], figure)
+        plot(recordings["backbone"], figure)
     assert figure.read_text() == "<p>notes</p>"
-    plot(recordings["sweep"], figure, overwrite=True)
+    plot(recordings["backbone"], figure, overwrite=True)
     first = figure.read_bytes()
-    plot(recordings["sweep"], figure)  # one of this program
+    plot(recordings["backbone"], figure)  # one of this program
     assert figure.read_bytes() == first
     with pytest.raises(RecordingError, match="cannot be written: No such file"):
-        plot(recordings["sweep"], Path(tmp_path / "nowhere" / "x.html"))
+        plot(recordings["backbone"], Path(tmp_path / "nowhere" / "x.html"))

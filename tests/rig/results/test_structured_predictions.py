@@ -9,6 +9,7 @@ from rig.campaigns.plans import plan_from
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response, phase_resonance_backbone
 from tests.recorded import recorded_at
+from tests.sharing import copy_of, made_once, shared_folder
 
 LINES = {"bench": "magnet-beam", "kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}
 LINES |= {"transient_periods": 3, "periods": 2, "realisations": 2, "levels_rms_v": [0.6]}
@@ -24,7 +25,11 @@ def model(shelf):
 
     recorded_at(shelf / "lines.h5", plan_from(LINES, "lines"), seed=1)
     request = StructuredOptions(modes=shelf / "LIN.h5", rate_hz=400.0, outputs="drive")
-    save(identify_model([shelf / "lines.h5"], request), shelf / "ST.h5")
+
+    def fit(folder):
+        save(identify_model([shelf / "lines.h5"], request), folder / "ST.h5")
+
+    copy_of(made_once(shared_folder() / "structured-predictions", fit), shelf)
     plan = SWEEP | {"levels_v": [0.3]}
     (shelf / "ahead.toml").write_text("\n".join(f"{name} = {json.dumps(value)}" for name, value in plan.items()))
     recorded_at(shelf / "ahead.h5", plan_from(plan, "ahead"), seed=2)

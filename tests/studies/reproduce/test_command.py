@@ -20,16 +20,21 @@ from studies.reproduce.specimens import SPECIMENS
 from studies.reproduce.steady import steady
 from studies.reproduce.sweeps import COUPLED, simulated_sweeps
 from tests.command import run_command
+from tests.sharing import copy_of, made_once, shared_folder
 
 SMALL = "reproduce magnet-beam --models 1 --levels 1 --iterations 8 --without sweeps"
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("reproduced") / "study"
+    made = made_once(shared_folder() / "reproduced", _reproduce) / "study"
+    return copy_of(made, tmp_path_factory.mktemp("reproduced") / "study")
+
+
+def _reproduce(folder):
+    folder /= "study"
     done = run_command(f"{SMALL} -o {folder}").succeeded()
     folder.joinpath("printed.txt").write_text(done.out)
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,9 @@ from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.row_buffer import RowBuffer
 from rig.measurements.experiments.build import rows_from_rest
+from rig.recording.reader import Recording
+from tests.recorded import recorded
+from tests.sharing import made_once, shared_folder
 
 PLACE = ("first_sample", "end_sample")
 
@@ -39,13 +42,16 @@ def shortened(name):
 def both(request):
     plan = shortened(request.param)
     thin = plan.model_copy(update={"rows": "records", "telemetry_s": 0.05})
-    with (
-        pytest.MonkeyPatch.context() as patched
-    ):  # records that wait for their evaluation in files give the same points
-        patched.setitem(RowBuffer.__init__.__kwdefaults__, "in_memory_bytes", 20_000)
-        records = rig.run(thin, seed=2)
-    with rig.run(plan, seed=2) as full, records:
-        yield full.recording, records.recording
+
+    def run(folder):
+        with pytest.MonkeyPatch.context() as patched:
+            # records that wait for their evaluation in files give the same points
+            patched.setitem(RowBuffer.__init__.__kwdefaults__, "in_memory_bytes", 20_000)
+            rig.run(thin, output=folder / "run.h5", seed=2).close()
+
+    folder = made_once(shared_folder() / f"stored-rows-{request.param.replace('/', '-')}", run)
+    with Recording(recorded(plan, seed=2)) as full, Recording(folder / "run.h5") as records:
+        yield full, records
 
 
 def test_points_are_those_of_a_recording_with_all_rows(both):
