@@ -136,3 +136,19 @@ def test_complex_response_control_with_a_real_gain_swings_on_the_friction_beam()
         assert assess(ControlLoop(plant, low_pass, law, amplitude_law)).stable == dies
         lags, _ = closed_loop("friction-beam", low_pass, law, amplitude_law, periods=300, offset_rad_s=0.1)
         assert (fluctuation(lags, 0.25) < math.radians(0.1)) == dies
+
+
+def test_what_lies_above_the_highest_frequency_is_neither_evaluated_nor_in_the_step_response():
+    """A loud line where the transfer function is faded to 1 %, and none of it asked for where it is faded out."""
+    highest, line = 200.0, 270.0
+
+    def transfer(s):
+        assert s.imag.max() <= 1.5 * highest
+        return 10.0 / (s + 10.0) + 100.0 * np.exp(-(((s.imag - line) / 5.0) ** 2))
+
+    time, response = step_response(transfer, 2.0, highest_rad_s=highest)
+    faded = math.sin(0.25 * math.pi * (3.0 - 2.0 * line / highest)) ** 2
+    loudest = 2.0 / math.pi * math.sqrt(math.pi) * 5.0 * 100.0 / line  # at 0 s, of the line as it comes
+    ringing = np.abs(response - 1.0 + np.exp(-10.0 * time))[time < 0.3].max()
+    assert ringing < 3.0 * faded * loudest + 0.1
+    assert ringing < 0.5 * loudest
