@@ -11,6 +11,7 @@ from rig.bench import Bench, load_bench
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.emulator.emulated import emulated
 from rig.measurements import point_rows
+from rig.recording.reader import Recording
 from rig.wire.can.slcan import SlcanBus
 from tests.rig.campaigns.running.test_runs import plan_with
 
@@ -51,6 +52,12 @@ def test_points_over_a_wire_are_those_of_the_virtual_rig_with_the_same_queue(wir
     require_points_of_the_virtual_rig(wire, rate, without_wire, **settings)
 
 
+def require_nothing_lost(recording: Recording) -> None:
+    """All counters are zero, but those of requests that a busy machine answers so late that they are asked again."""
+    counters = recording.parts[-1].end["counters"]
+    assert {name for name, times in counters.items() if times} <= {"retries", "stray_answers"}
+
+
 def require_points_of_the_virtual_rig(
     wire: str, rate: str, without_wire: dict[str, list[dict[str, Any]]], **settings: Any
 ) -> None:
@@ -59,8 +66,7 @@ def require_points_of_the_virtual_rig(
         rig.run(PLAN, bench=bench, seed=1) as run,
     ):
         assert run.complete
-        counters = run.recording.parts[-1].end["counters"]
-        assert not any(counters.values())
+        require_nothing_lost(run.recording)
         for point, wanted in zip(run.recording.points, without_wire[rate], strict=True):
             assert point["accepted"]
             for key, tolerance in EQUAL.items():
