@@ -41,6 +41,9 @@ class Parameters:
     poles: int | None = None
     """Number of modes whose frequency and damping ratio are free, the first ones; None for all. The data do not show those of a
     mode that stands for all modes above the band: whatever its frequency is, its ringing leaves the same residual."""
+    measured: int | None = None
+    """Number of modes that were measured, the first ones; None for all. Those after them stand for modes above and stay there:
+    at least midway, in logarithms, between the highest measured frequency and their own initial one."""
 
     @property
     def _poles(self) -> int:
@@ -104,6 +107,9 @@ class Parameters:
         frequency = np.log(self.start.frequency_hz[:poles])
         highest = np.log(HIGHEST / self.start.step_s)
         least[:poles], largest[:poles] = frequency - _NEAR, np.minimum(frequency + _NEAR, highest)
+        if self.measured is not None and self.measured < poles:
+            above = slice(self.measured, poles)
+            least[above] = np.maximum(least[above], 0.5 * (frequency[above] + np.max(frequency[: self.measured])))
         least[poles : 2 * poles], largest[poles : 2 * poles] = np.log(_LEAST_DAMPING), np.log(_LARGEST_DAMPING)
         laws = [self.start.elements[e].laws[law].bounds for e, law in laws_in_order(self.start.elements)]
         at = (

@@ -202,11 +202,12 @@ def _fitted(
     watch: FitWatch,
 ) -> Fitted:
     """Fit all numbers, in stages with smaller and smaller nudging forces."""
+    measured = len(modes.frequency_hz)
     tied = (find_role(start.outputs, "drive"),)
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
     found, evaluations, iterations, misfit = start, 0, 0, _MISFIT
     seen = float(linear.frequency_hz[-1]) < 0.5 * linear.sample_rate_hz  # the last may be the residual's
-    poles = len(linear.frequency_hz if seen else modes.frequency_hz)
+    poles = len(linear.frequency_hz) if seen else measured
     rough = rough_steps(start)
     slowest = float(np.min((linear.omega * linear.damping_ratio)[:nudged]))
     for number, (ratio, free, turned) in enumerate(_STAGES[support], 1):
@@ -223,7 +224,7 @@ def _fitted(
             else None
             for e, count in zip(settled, lengths, strict=True)
         ]
-        parameters = Parameters(begun, tied, free, turned, poles)
+        parameters = Parameters(begun, tied, free, turned, poles, measured)
         problem = Problem(parameters, settled, nudgings, ModalTest(parameters, modes, linear), misfit, watch)
         end = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found = parameters.model(end.vector)
