@@ -332,3 +332,12 @@ def test_an_element_that_would_do_work_is_refused():
         beam(elements=(replace(beam().elements[0], direction=[1.0]),))
     with refused(IdentificationError, "shape-9", field="inputs", allowed="1 rows"):
         beam().simulate(np.zeros((2, 9)))
+
+
+def test_a_mode_that_stands_for_those_above_the_measured_ones_stays_above_them():
+    model = beam(frequency_hz=[25.0, 64.0])
+    parameters = Parameters(model, (0,), support=False, measured=1)
+    least, _ = parameters.bounds(parameters.vector(model))
+    np.testing.assert_allclose(np.exp(least[:2]), [12.5, 40.0])  # an octave, and midway to the measured one
+    least, _ = replace(parameters, measured=2).bounds(parameters.vector(model))
+    np.testing.assert_allclose(np.exp(least[:2]), [12.5, 32.0])
