@@ -20,6 +20,8 @@ FORCES: dict[str, Law] = {
     "joint": Masing.spaced(8),
 }
 """Forces that are looked for: of the displacement, of displacement and velocity, and of the displacement and its past."""
+_PAIRED = 6
+"""Most outputs between any two of which forces are looked for: pairs of more take minutes. Chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +56,8 @@ def missing_forces(
     alike in the data have like shares.
 
     Not seen are modes that the outputs do not tell apart, and places without a sensor but as they move a mode. Noise is no part
-    of it: ask where noise does not explain the residual. Raises `IdentificationError` if no experiment is periodic.
+    of it: ask where noise does not explain the residual. With more than six outputs, forces between two of them are not looked
+    for. Nothing is returned of a model whose run is not bounded. Raises `IdentificationError` if no experiment is periodic.
 
     Parameters
     ----------
@@ -67,6 +70,8 @@ def missing_forces(
     """
     parts = [ModalMotion(model, one, measured_modes) for one in periodic_of(experiments)]
     left = _real(np.concatenate([np.ravel(part.weight * part.left) for part in parts])[:, None])
+    if not np.isfinite(left).all():
+        return ()
     own, least = _own(model, parts)
     without = _left_over(own, least, left)
     tried = []
@@ -84,7 +89,7 @@ def missing_forces(
 def _places(model: StructuredModel, modes: int) -> dict[str, Float]:
     """Directions in the measured modes by their names."""
     names = [channel.name for channel in model.outputs]
-    between = [*((name,) for name in names), *combinations(names, 2)]
+    between = [*((name,) for name in names), *(combinations(names, 2) if len(names) <= _PAIRED else ())]
     found = {":".join(one): model.output_selector(one) @ model.output_shapes[:, :modes] for one in between}
     return found | {f"mode {index}": row for index, row in enumerate(np.eye(modes), 1)}
 
