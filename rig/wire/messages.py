@@ -13,6 +13,13 @@ import numpy as np
 LOWEST_VERSION, VERSION = 1, 2
 """Oldest and latest version of the protocol that this package speaks."""
 
+ROW_BYTES = 32
+"""Bytes of a telemetry row (`rig.tick.layout.ROW`)."""
+LARGEST_PIECE = 512
+"""Bytes of a record in one message."""
+STATE_BYTES = 2048
+"""Bytes that a device's state takes at most with all that frames it; for the load of a wire."""
+
 HEARTBEATS_HZ = 10
 """Heartbeats per second; every change of state or of what has latched sends a further one."""
 
@@ -34,6 +41,10 @@ class Command(IntEnum):
     """0 V at once; sampling goes on."""
     CLEAR = 7
     """Forget a latched watchdog or emergency stop, once its cause is gone. Only while idle."""
+    RAMP = 8
+    """Ramp to 0 V, which ends the plan. Only while the device runs the loop, as `RELEASE`."""
+    RELEASE = 9
+    """Let the start segment of the plan end at its time."""
 
 
 ARM_KEY = 0x41524D21  # "ARM!": no bit error in another command arms a device
@@ -151,6 +162,20 @@ class Parameter(IntEnum):
     """CRC-32 of the definition that sender and receiver must share; 0 where there is none."""
     PING = 65
     """Any item, answered at once."""
+    TICK_DIGEST = 80
+    """Text of 64 characters, in version 2: digest of the compiled loop that the device has; left out where it has none."""
+    TICK_ROOM = 81
+    """Bytes of memory for the records of a run."""
+    LOOP = 82
+    """Set: 0, the host runs the loop; 1, the device does."""
+    TICK_BYTES = 83
+    """Set, by array of the records: its size; array 0 forgets all of them."""
+    TICK_PERIOD = 84
+    """Set: entries in one waveform."""
+    TICK_CRC = 85
+    """By array of the records: CRC-32 of what lies in the device."""
+    TICK_FAULT = 86
+    """Why the last START of a loop on the device was refused: 256 times the array, and a reason; 0 for none."""
 
 
 class Request(NamedTuple):
@@ -219,6 +244,44 @@ class Readback(NamedTuple):
     """Number of the block on the wire, wrapping."""
 
 
+class Record(NamedTuple):
+    """Host to device, in version 2: a piece of the records with which the device runs the loop. Not answered."""
+
+    array: int
+    """Place of the array among the records."""
+    offset: int
+    """Of the piece in the array, bytes."""
+    data: bytes
+    """At most `LARGEST_PIECE` bytes."""
+
+
+class State(NamedTuple):
+    """Device to host, in version 2: parts of the records at the end of a block of `Rows`, which it goes immediately before."""
+
+    sample: int
+    """Number of samples that the loop has processed."""
+    pieces: tuple[Record, ...]
+
+
+class Rows(NamedTuple):
+    """Device to host, in place of `Samples` where the device runs the loop: a block of what the loop makes of its samples."""
+
+    first: int
+    """Index of the first row, since START."""
+    readings: np.ndarray
+    """float32 [n, n_channels], SI units."""
+    rows: np.ndarray
+    """uint8 [n, `ROW_BYTES`]: telemetry rows of the loop, as they lie in memory."""
+    flags: int = 0
+    """`DeviceFlag`."""
+    dropped: int = 0
+    """Number of samples since START that the device could not send."""
+    clock_us: int = 0
+    """Device clock when the last row was measured, microseconds."""
+    sequence: int = 0
+    """Number of the block on the wire, wrapping."""
+
+
 class Heartbeat(NamedTuple):
     """Device to host, ten times a second and at every change of state or of what has latched."""
 
@@ -243,7 +306,7 @@ class EmergencyStop(NamedTuple):
     reason: int = 0
 
 
-Message = Request | Answer | Samples | Output | Readback | Heartbeat | EmergencyStop
+Message = Request | Answer | Samples | Output | Readback | Record | State | Rows | Heartbeat | EmergencyStop
 
 
 class Stream(NamedTuple):
@@ -254,3 +317,5 @@ class Stream(NamedTuple):
     rate_hz: float
     bits: int = 16
     queue: int = 1
+    loop: bool = False
+    """Whether the device runs the loop, so that `Rows` and `State` come in place of samples."""

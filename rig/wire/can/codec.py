@@ -98,7 +98,9 @@ class CanCodec:
         if isinstance(message, Heartbeat):
             self._last_beat = message
             return [self._heartbeat(message)]
-        return [Frame(self._identifiers[FrameKind.EMERGENCY_STOP, 0], bytes((message.reason & 0xFF,)))]
+        if isinstance(message, EmergencyStop):
+            return [Frame(self._identifiers[FrameKind.EMERGENCY_STOP, 0], bytes((message.reason & 0xFF,)))]
+        raise DaqRefused("a device that runs the loop is reached by a serial line, not by CAN")
 
     def _heartbeat(self, beat: Heartbeat) -> Frame:
         dropped = min(beat.dropped, _LARGEST_DROPPED)

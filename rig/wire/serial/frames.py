@@ -8,7 +8,7 @@ from zlib import crc32
 
 from cobs.cobs import DecodeError, decode, encode
 
-from rig.wire.messages import Message, Stream
+from rig.wire.messages import STATE_BYTES, Message, Stream
 from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Oversize
 
 CRC_SIZE = 4  # bytes of a CRC-32
@@ -59,7 +59,9 @@ class FrameReader:
 
     def configure(self, stream: Stream) -> None:
         """Expect no frame longer than those of a stream."""
-        self._longest = largest_frame(max(*Codec.sizes(stream, self._codec.version), 64))
+        self._longest = largest_frame(
+            max(*Codec.sizes(stream, self._codec.version), STATE_BYTES if stream.loop else 64)
+        )
 
     def feed(self, data: bytes) -> list[Message]:
         """Messages that are complete with these bytes, in order."""

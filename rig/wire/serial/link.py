@@ -11,7 +11,7 @@ from typing import Self
 
 from rig.errors import DaqDisconnected, DaqTimeout
 from rig.wire.link import LATE_SHARE, Link, Load
-from rig.wire.messages import HEARTBEATS_HZ, VERSION, Message, Output, Readback, Samples, Stream
+from rig.wire.messages import HEARTBEATS_HZ, STATE_BYTES, VERSION, Message, Output, Readback, Rows, Samples, Stream
 from rig.wire.serial.codec import HEARTBEAT_BODY, Codec
 from rig.wire.serial.frames import FrameReader, frame, largest_frame
 from rig.wire.serial.port import is_pseudo_terminal
@@ -32,7 +32,11 @@ def line_load(stream: Stream, baud: int | None, version: int = VERSION) -> Load:
     heartbeat = largest_frame(HEARTBEAT_BODY.size) + 1  # and the zero before it
     needed = BITS_A_BYTE * (blocks_hz * samples + HEARTBEATS_HZ * heartbeat)
     terms = f"{blocks_hz:g}/s x {samples} bytes of samples + {HEARTBEATS_HZ}/s x {heartbeat} bytes of heartbeats"
-    if readback_size:
+    if stream.loop:
+        state = largest_frame(STATE_BYTES) + 1
+        needed += BITS_A_BYTE * blocks_hz * state
+        terms += f" + {blocks_hz:g}/s x {state} bytes of the loop's state"
+    elif readback_size:
         late_hz, readback = LATE_SHARE * blocks_hz, largest_frame(readback_size)
         needed += BITS_A_BYTE * late_hz * readback
         terms += f" + {late_hz:g}/s x {readback} bytes of readbacks"
@@ -41,7 +45,7 @@ def line_load(stream: Stream, baud: int | None, version: int = VERSION) -> Load:
     return Load(needed, math.inf if baud is None else float(baud), sum_text)
 
 
-STREAMED = (Samples, Output, Readback)
+STREAMED = (Samples, Output, Readback, Rows)
 WRITE_TIMEOUT_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
 
 

@@ -4,7 +4,22 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Message, Output, Readback, Request, Samples, Stream
+from rig.wire.messages import (
+    LARGEST_PIECE,
+    ROW_BYTES,
+    Answer,
+    EmergencyStop,
+    Heartbeat,
+    Message,
+    Output,
+    Readback,
+    Record,
+    Request,
+    Rows,
+    Samples,
+    State,
+    Stream,
+)
 
 U8, U16, U32, U64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
 
@@ -14,7 +29,19 @@ streams = st.builds(
     block=st.integers(1, 20),
     rate_hz=st.just(1000.0),
     bits=st.sampled_from([16, 32]),
+    loop=st.booleans(),
 )
+pieces = st.builds(Record, U8, U32, st.binary(min_size=1, max_size=LARGEST_PIECE))
+states = st.builds(State, U64, st.lists(pieces, max_size=3).map(tuple))
+
+
+def blocks(stream: Stream, version: int) -> st.SearchStrategy[Message]:
+    """Blocks from a device: of samples, or of rows where it runs the loop."""
+    if not (stream.loop and version > 1):
+        return st.builds(Samples, U64, counts(stream, stream.block, stream.n_channels), U16, U32, U64, U16)
+    floats = st.floats(width=32, allow_nan=False)
+    readings = arrays(np.float32, (stream.block, stream.n_channels), elements=floats)
+    return st.builds(Rows, U64, readings, arrays(np.uint8, (stream.block, ROW_BYTES)), U16, U32, U64, U16)
 
 
 def counts(stream: Stream, *shape: int) -> st.SearchStrategy[np.ndarray]:
@@ -23,14 +50,13 @@ def counts(stream: Stream, *shape: int) -> st.SearchStrategy[np.ndarray]:
 
 
 def messages(stream: Stream, version: int) -> st.SearchStrategy[Message]:
-    samples = counts(stream, stream.block, stream.n_channels)
     later = (U32, U32) if version > 1 else (st.just(0), st.just(0))
-    of_version_2 = [st.builds(Readback, U64, counts(stream, stream.block), U16)] if version > 1 else []
+    of_version_2 = [st.builds(Readback, U64, counts(stream, stream.block), U16), pieces, states] if version > 1 else []
     return st.one_of(
         *of_version_2,
         st.builds(Request, U8, U8, U8, U8, U32),
         st.builds(Answer, U8, U8, U8, U8, U32),
-        st.builds(Samples, U64, samples, U16, U32, U64, U16),
+        blocks(stream, version),
         st.builds(Output, U64, counts(stream, stream.block), U16, *later),
         st.builds(Heartbeat, U8, U16, U8, U32, U32),
         st.builds(EmergencyStop, U8),

@@ -36,9 +36,9 @@ payloads = st.sampled_from(SIZES).flatmap(lambda size: st.binary(min_size=size, 
 )
 
 
-@given(payloads, st.integers(0, 8), VERSIONS)
-def test_any_bytes_are_a_message_or_malformed(payload, kind, version):
-    codec = configured(version=version)
+@given(payloads, st.integers(0, 11), VERSIONS, st.booleans())
+def test_any_bytes_are_a_message_or_malformed(payload, kind, version, loop):
+    codec = configured(STREAM._replace(loop=loop), version)
     payload = payload[:1] + bytes([kind]) + payload[2:]
     try:
         message = codec.decode(payload)
