@@ -214,6 +214,11 @@ class Samples(NamedTuple):
     sequence: int = 0
     """Number of the block on the wire, wrapping."""
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Samples and channels."""
+        return self.counts.shape
+
 
 class Output(NamedTuple):
     """Host to device: the outputs of one block."""
@@ -280,6 +285,11 @@ class Rows(NamedTuple):
     """Device clock when the last row was measured, microseconds."""
     sequence: int = 0
     """Number of the block on the wire, wrapping."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Samples and channels."""
+        return self.readings.shape
 
 
 class Heartbeat(NamedTuple):

@@ -14,7 +14,9 @@ from rig.wire.messages import (
     Parameter,
     Readback,
     Request,
+    Rows,
     Samples,
+    State,
     Status,
 )
 from rig.wire.parameter_words import NAME_WORDS, as_float, as_text
@@ -50,7 +52,7 @@ class Dialogue:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self.link = link
         self.clock = clock
-        self.early: deque[Samples | Readback | Heartbeat] = deque(maxlen=WAITING_BLOCKS)
+        self.early: deque[Samples | Rows | Readback | State | Heartbeat] = deque(maxlen=WAITING_BLOCKS)
         """Stream messages that arrived while an answer was awaited."""
         self.retries = 0
         self.stray_answers = 0
@@ -98,7 +100,7 @@ class Dialogue:
                 if message[0] == request.number and message[2:4] == request[2:4]:
                     return message
                 self.note_stray(message)
-            elif isinstance(message, Samples | Readback | Heartbeat):
+            elif isinstance(message, Samples | Rows | Readback | State | Heartbeat):
                 self.early.append(message)
         return None
 

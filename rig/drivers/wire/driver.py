@@ -4,6 +4,7 @@ import math
 import time
 from abc import abstractmethod
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from rig.drivers.wire.connection import MOST_LOAD, Connection
 from rig.drivers.wire.dialogue import latched_text
 from rig.drivers.wire.facts import DeviceFacts, remarks_on
 from rig.drivers.wire.options import LARGEST_QUEUE, WireOptions, raised_remark, watchdog_range_s, watchdog_s
+from rig.drivers.wire.remote_loop import RemoteLoop
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
 from rig.text.disorder import LATE_BLOCKS, REORDERED_BLOCKS, disorder_text
+from rig.tick.layout import TickArrays
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
 
@@ -42,7 +45,7 @@ class WireDAQ(DAQ):
         self._bench = bench
         self._given = self._options = options
         self._connection: Connection | None = None
-        self._streaming: Streaming | None = None
+        self._streaming: Streaming | RemoteLoop | None = None
 
     @abstractmethod
     def _make_link(self) -> Link:
@@ -207,8 +210,33 @@ class WireDAQ(DAQ):
         stream = Stream(len(self.channels), self.block, self.sample_rate_hz, facts.bits, queue)
         self._streaming = Streaming(connection, stream, self._options)
 
+    @property
+    def loop(self) -> Literal["computer", "device", "auto"]:
+        """Where the bench wants the loop to run."""
+        return self._options.loop
+
+    @property
+    def loop_digest(self) -> str:
+        """Digest of the loop that the open device was built with; empty if it has none."""
+        return self._facts.loop_digest if self._facts else ""
+
+    @property
+    def loop_latency_samples(self) -> float:
+        """Delay from an output to its effect where the device runs the loop: half a sample of hold, and the filters."""
+        return HOLD_SAMPLES + self.filter_delay_samples
+
+    def load_loop(self, arrays: TickArrays, block: int) -> RemoteLoop:
+        """Bring the records of a run to the open device; ``block``: rows that it sends at a time. Raises `DaqError`."""
+        connection, facts = self._connection, self._facts
+        assert connection is not None
+        assert facts is not None
+        rows = min(block, facts.largest_block)
+        stream = Stream(len(self.channels), rows, self.sample_rate_hz, facts.bits, 1, loop=True)
+        self._streaming = loop = RemoteLoop(connection, stream, self._options, arrays)
+        return loop
+
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        assert self._streaming is not None
+        assert isinstance(self._streaming, Streaming)
         self._streaming.exchange(voltages, self.continuation, inputs, self.flags, self.put_out, self.do_meanwhile)
 
     def emergency_stop(self, reason: int = 0) -> None:

@@ -8,11 +8,12 @@ from rig.bench import Bench
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqMismatch, DaqProtocol
 from rig.wire.messages import LOWEST_VERSION, VERSION, Command, Parameter
-from rig.wire.parameter_words import as_double
+from rig.wire.parameter_words import as_double, as_text
 
 FLOAT_TOLERANCE = 1e-6  # float32 on the wire
 MOST_CHANNELS = 31  # items of a text parameter are numbered by one byte
 SAME_RESOLUTION = 0.01  # relative difference of resolutions that is worth a remark; chosen
+DIGEST_WORDS = 16  # of four characters each
 SAME_SKEW_SAMPLES = 0.01  # samples; difference of skews that is worth a remark; chosen
 
 
@@ -50,6 +51,8 @@ class DeviceFacts:
     """Version of the protocol in use."""
     longest_period: int
     """Longest period of outputs that the device can go on with, samples; 0 for none."""
+    loop_digest: str = ""
+    """Digest of the compiled loop that the device has; empty if it has none."""
 
 
 def negotiate(dialogue: Dialogue, latest: int = VERSION) -> None:
@@ -107,6 +110,7 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
         layout_crc=get(Parameter.LAYOUT_CRC, default=0),
         version=dialogue.link.version,
         longest_period=get(Parameter.LONGEST_PERIOD, default=0) if dialogue.link.version > LOWEST_VERSION else 0,
+        loop_digest=_loop_digest(dialogue) if dialogue.link.version > LOWEST_VERSION else "",
     )
     scales = np.array([*facts.v_per_count, *facts.range_v, facts.output_v_per_count, facts.output_range_v])
     if not (np.isfinite(scales).all() and (scales > 0.0).all() and facts.largest_block >= 1):
@@ -114,6 +118,13 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
             f"{dialogue.link.name}: the device reports ranges, steps or blocks that are not positive numbers"
         )
     return facts
+
+
+def _loop_digest(dialogue: Dialogue) -> str:
+    """The digest of the device's own loop, or an empty text."""
+    if not dialogue.get(Parameter.TICK_DIGEST, 0, 0):
+        return ""
+    return as_text([dialogue.get(Parameter.TICK_DIGEST, item, 0) for item in range(DIGEST_WORDS)])
 
 
 def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> None:

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from rig.wire.messages import (
     Heartbeat,
     Message,
     Readback,
+    Rows,
     Samples,
+    State,
 )
 
 OLD_BLOCKS_IN_A_ROW = 3  # consecutive old blocks after which the device must have started to count anew
@@ -30,8 +33,11 @@ REMEMBERED = 4  # blocks that were given up (one of them that comes after all is
 MOST_LOOKED_AT = 64  # messages that are looked through for a block that another has overtaken
 
 
-class Incoming:
-    """The samples of a streaming device, block by block.
+Block = TypeVar("Block", Samples, Rows)
+
+
+class Incoming(Generic[Block]):
+    """The blocks of a streaming device one by one: samples, or rows where the device runs the loop.
 
     ``shape`` is that of a block. A gap of more than ``longest_gap`` samples is an error: the watchdog would have ended the
     stream before. In version 2 of the protocol a block in which an output was missing comes with a readback, or is a gap.
@@ -49,11 +55,16 @@ class Incoming:
         timeout_s: float,
         boot: int,
         patience_s: float = 0.0,
+        *,
+        kind: type[Block] = Samples,  # type: ignore[assignment]  # what most devices send
     ) -> None:
         self._dialogue, self._link, self._clock = dialogue, dialogue.link, dialogue.clock
         self._shape, self._block, self._longest_gap = shape, shape[0], longest_gap
         self._boot, self._timeout_s, self._patience_s = boot & 0xFF, timeout_s, patience_s
+        self._kind: type[Block] = kind
         self.on_answer: Callable[[Answer], None] = dialogue.note_stray
+        self.on_state: Callable[[State], None] | None = None
+        """Takes the state of a loop on the device."""
         self.expected = 0
         """Index of the first sample of the next block."""
         self.blocks = 0
@@ -68,16 +79,16 @@ class Incoming:
         """Blocks that came after they had been given up."""
         self.misplaced_blocks = 0
         self.dropped = 0
-        self._newer: deque[Samples] = deque()
+        self._newer: deque[Block] = deque()
         self._given_up: deque[int] = deque(maxlen=REMEMBERED)
         self._readbacks: dict[int, Readback] = {}
-        self._untold: dict[int, Samples] = {}
+        self._untold: dict[int, Block] = {}
         self._reads_back = dialogue.link.version > LOWEST_VERSION
         self._old_in_a_row = 0
         self._last_old = 0
         self._unarmed_beats = 0
 
-    def take(self) -> Samples | None:
+    def take(self) -> Block | None:
         """The next block; None if it was lost, which shows when a newer block arrives."""
         newer = self._newer
         if not newer:
@@ -106,7 +117,7 @@ class Incoming:
             message = self._next(left_s)
             if message is None:
                 return
-            if not isinstance(message, Samples):
+            if not isinstance(message, self._kind):
                 self._other(message)
             elif message.first == first:
                 self.repeated_blocks += 1
@@ -130,14 +141,15 @@ class Incoming:
         self._readbacks[message.first] = message
         return self._untold.pop(message.first, message)
 
-    def _wait(self) -> Samples:
+    def _wait(self) -> Block:
         until = 0.0
-        left_s = self._timeout_s
+        left_s, kind = self._timeout_s, self._kind
         while True:
             message = self._next(left_s)
-            if message.__class__ is Samples and self._is_good(message):
-                return message
-            if message is not None and message.__class__ is not Samples:
+            if isinstance(message, kind):
+                if self._is_good(message):
+                    return message
+            elif message is not None:
                 self._other(message)
             now = self._clock()
             until = until or now + self._timeout_s
@@ -148,13 +160,13 @@ class Incoming:
                     f"{self._dialogue.damage()}; the device is silent or its cable is damaged"
                 )
 
-    def _is_good(self, samples: Samples) -> bool:
+    def _is_good(self, samples: Block) -> bool:
         first, block = samples.first, self._block
         if samples.flags & STOPPED:
             self._raise_stopped(samples.flags)
         if samples.dropped > self.dropped:
             self.dropped = samples.dropped
-        if first >= self.expected and first % block == 0 and samples.counts.shape == self._shape:
+        if first >= self.expected and first % block == 0 and samples.shape == self._shape:
             if first - self.expected > self._longest_gap:
                 raise DaqProtocol(
                     f"{self._link.name}: the device jumps from sample {self.expected} to {first}, "
@@ -179,7 +191,7 @@ class Incoming:
             )
         return False
 
-    def _is_told(self, samples: Samples) -> bool:
+    def _is_told(self, samples: Block) -> bool:
         """Whether a block in which an output was missing came with what was put out instead; version 1 tells that never."""
         if not self._reads_back or not samples.flags & MISSED or samples.first in self._readbacks:
             return True
@@ -191,6 +203,9 @@ class Incoming:
     def _other(self, message: Message) -> None:
         if isinstance(message, Answer):
             self.on_answer(message)
+        elif isinstance(message, State):
+            if self.on_state is not None:
+                self.on_state(message)
         elif isinstance(message, Heartbeat):
             if message.boot != self._boot:
                 raise DaqReset(f"{self._link.name}: the device restarted during the run; its output is 0 V")

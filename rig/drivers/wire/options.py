@@ -33,6 +33,11 @@ class WireOptions(Configured):
     timeout_s: float | None = Field(None, gt=0, le=MOST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
 
+    loop: Literal["computer", "device", "auto"] = "computer"
+    """Where the loop runs. ``"device"``: in a device that was built with the same loop (`rig firmware tick`); it then needs no
+    computer between one sample and the next. On a serial line only. ``"auto"``: there if the device has the same loop, else on
+    the computer."""
+
     @property
     def queue(self) -> int:
         """Number of blocks; 1 until ``"auto"`` was replaced by a number (`rig.daq.DAQ.adjust`)."""
@@ -53,6 +58,12 @@ def check_inputs(inputs: Sequence[int | str], bench: Bench) -> None:
 DEFAULT_S, DEFAULT_BLOCKS = 0.1, 4  # default watchdog, s and blocks, the longer of the two; chosen
 SHORTEST_BLOCKS = 2  # blocks of the shortest watchdog: one block may be under way
 LONGEST_S, LONGEST_BLOCKS = 1.0, 10  # where something moves: so long an output may be held
+
+
+LOOP_S = 30.0
+"""Default watchdog where the device runs the loop, s; chosen: limits and trips act there, without the computer."""
+LONGEST_LOOP_S = 600.0
+"""The longest one where something moves, s; chosen: for so long a vibration may go on that nobody watches."""
 
 
 def _default_s(block_s: float) -> float:
@@ -89,6 +100,17 @@ def watchdog_s(options: WireOptions, device_s: float, block_s: float, *, moves: 
             value=chosen_s,
             allowed=f"up to {longest_s:g} s for a device that may move something: it holds its last output for as long",
         )
+    return chosen_s
+
+
+def loop_watchdog_s(options: WireOptions, device_s: tuple[float, float], *, moves: bool) -> float:
+    """Watchdog time for a loop on the device, s; ``device_s``: shortest and longest that it can do.
+
+    Raises `DaqRefused` if the bench asks for one that is too long for a device that moves something.
+    """
+    chosen_s = options.watchdog_s or min(max(LOOP_S, device_s[0]), device_s[1])
+    if moves and chosen_s > LONGEST_LOOP_S:
+        raise DaqRefused(field="driver.options.watchdog_s", value=chosen_s, allowed=f"up to {LONGEST_LOOP_S:g} s")
     return chosen_s
 
 

@@ -19,6 +19,20 @@ WAITED = 0.5  # of the time that the queue leaves once the next block has come, 
 FLAG_NAMES = tuple(str(flag.name).lower() for flag in DeviceFlag)
 
 
+def set_up(connection: Connection, stream: Stream, wait_s: float, ramp_s: float) -> None:
+    """Set what a run needs: rate, block, queue, watchdog and its ramp, and who runs the loop."""
+    put, facts = connection.set, connection.facts
+    assert facts is not None
+    put(Parameter.RATE_MHZ, round(1e3 * stream.rate_hz), "sample_rate_hz", 1e-3, "Hz")
+    put(Parameter.BLOCK, stream.block, "block", 1, "samples")
+    put(Parameter.QUEUE, stream.queue, "driver.options.queue_blocks", 1, "blocks")
+    put(Parameter.WATCHDOG_US, round(1e6 * wait_s), "driver.options.watchdog_s", 1e-6, "s")
+    put(Parameter.RAMP_US, round(1e6 * ramp_s), "driver.options.ramp_s", 1e-6, "s")
+    if facts.loop_digest:
+        put(Parameter.LOOP, int(stream.loop), "driver.options.loop", 1, "(0 computer, 1 device)")
+    connection.link.configure(stream)
+
+
 class Streaming:
     """Outputs to the device and samples from it during one run.
 
@@ -35,7 +49,7 @@ class Streaming:
         wait_s = watchdog_s(options, facts.watchdog_s[0], block_s, moves=not facts.simulated)
         connection.check_latch()
         self._watchdog_s = wait_s
-        self._set_up(stream, wait_s, options.ramp_s)
+        set_up(connection, stream, wait_s, options.ramp_s)
         timeout_s = options.timeout_s or max(0.25, 10.0 * block_s)
         self._dialogue.early.clear()
         longest_gap = math.ceil((wait_s + timeout_s) * stream.rate_hz) + stream.block
@@ -60,15 +74,6 @@ class Streaming:
         self._blocks_out = 0
         self._blocks_between_pings = max(1, round(1.0 / block_s / PINGS_PER_S))
         self._ping: tuple[int, float] | None = None
-
-    def _set_up(self, stream: Stream, wait_s: float, ramp_s: float) -> None:
-        put = self._connection.set
-        put(Parameter.RATE_MHZ, round(1e3 * stream.rate_hz), "sample_rate_hz", 1e-3, "Hz")
-        put(Parameter.BLOCK, stream.block, "block", 1, "samples")
-        put(Parameter.QUEUE, stream.queue, "driver.options.queue_blocks", 1, "blocks")
-        put(Parameter.WATCHDOG_US, round(1e6 * wait_s), "driver.options.watchdog_s", 1e-6, "s")
-        put(Parameter.RAMP_US, round(1e6 * ramp_s), "driver.options.ramp_s", 1e-6, "s")
-        self._link.configure(stream)
 
     def _begin(self) -> None:
         self._dialogue.forget()

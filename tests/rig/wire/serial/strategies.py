@@ -51,7 +51,8 @@ def counts(stream: Stream, *shape: int) -> st.SearchStrategy[np.ndarray]:
 
 def messages(stream: Stream, version: int) -> st.SearchStrategy[Message]:
     later = (U32, U32) if version > 1 else (st.just(0), st.just(0))
-    of_version_2 = [st.builds(Readback, U64, counts(stream, stream.block), U16), pieces, states] if version > 1 else []
+    of_version_2 = [st.builds(Readback, U64, counts(stream, stream.block), U16)] if version > 1 else []
+    of_version_2 += [pieces, states] if version > 1 and stream.loop else []
     return st.one_of(
         *of_version_2,
         st.builds(Request, U8, U8, U8, U8, U32),

@@ -1,0 +1,274 @@
+"""A loop that runs on the device itself, as a campaign sees it: rows and state come in blocks, requests go out.
+
+The device has the same compiled loop as this computer (`rig firmware tick`), gets the records of a run, and then needs nobody
+between one sample and the next: limits and trips act there within a sample.
+"""
+
+import math
+import time
+import warnings
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Literal, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.daq import DAQ, LOST, Image
+from rig.errors import DaqError, DaqMismatch, RigError, as_daq_error
+from rig.loop.driven_loop import end_by_driver
+from rig.loop.loop import LoopStatistics
+from rig.text.json_values import JsonObject
+from rig.tick.layout import DEVICE_SHIFT, ROW, TickArrays
+from rig.tick.tick import Tick, TickSettings
+from rig.wire.messages import Rows, State
+
+ROWS_S = 0.02  # of rows that the device sends at a time; chosen: as a loop by the clock hands over
+WHOLE_STATE_S = 2.0  # after the end, for outcomes that were lost on the way; chosen
+ON_DEVICE = "the loop runs on the device: this computer collects its rows"
+
+
+class RemoteLoop(Protocol):
+    """A run of a loop on a device."""
+
+    @property
+    def expected(self) -> int:
+        """Index of the first sample of the next block."""
+
+    def begin(self) -> None:
+        """Start the loop, and arm the device."""
+
+    def take(self) -> tuple[Rows | None, State | None]:
+        """Wait for the next block; None if it was lost, and for its state if that was."""
+
+    def ramp(self) -> None:
+        """Ask for the ramp to 0 V."""
+
+    def release(self) -> None:
+        """Let the start segment end at its time."""
+
+    def agrees(self, name: str, array: np.ndarray) -> bool:
+        """Whether an array of the records lies in the device as it lies here."""
+
+    def stop(self) -> None:
+        """0 V, and no more rows."""
+
+
+@runtime_checkable
+class RunsLoops(Protocol):
+    """A driver whose device may run the loop."""
+
+    @property
+    def loop(self) -> Literal["computer", "device", "auto"]:
+        """Where the bench wants the loop to run."""
+
+    @property
+    def loop_digest(self) -> str:
+        """Digest of the loop that the open device was built with; empty if it has none."""
+
+    @property
+    def loop_latency_samples(self) -> float:
+        """Delay from an output to its effect where the device runs the loop."""
+
+    def load_loop(self, arrays: TickArrays, block: int) -> RemoteLoop:
+        """Bring the records of a run to the open device."""
+
+
+class DeviceLoop:
+    """A loop on a device: its rows, and a copy of its state at the last row.
+
+    Rows that the wire has lost keep their place: inputs that are not numbers, marked as lost.
+    """
+
+    failure: DaqError | None
+
+    def __init__(self, daq: DAQ, remote: RemoteLoop, tick: Tick, block: int) -> None:
+        self.daq, self.tick = daq, tick
+        self.failure, self.cause = None, ""
+        self.statistics = LoopStatistics(daq.sample_rate_hz)
+        self.ended = False
+        self._remote, self._block = remote, block
+        self._bytes = [array.reshape(-1).view(np.uint8) for array in tick.arrays]
+        self._last = np.zeros(1, ROW)
+        self._wants_ramp = self._wants_release = False
+
+    def run(self) -> Iterator[np.ndarray]:
+        """Telemetry in chunks of about 20 ms, until the output is off."""
+        began = time.perf_counter()
+        while not self.ended:
+            try:
+                rows = self._next()
+                if self.tick.over:
+                    self._finish()
+            except Exception as error:
+                self._fail(as_daq_error(error))
+                return
+            self.statistics.samples += rows.size
+            self.statistics.wall_s = time.perf_counter() - began
+            yield rows
+
+    @property
+    def waits(self) -> bool:
+        """False, because the device continues."""
+        return False
+
+    def request_stop(self, cause: str = "") -> None:
+        """Request the ramp to 0 V, which is passed on with the next block."""
+        self.cause = self.cause or cause
+        self._wants_ramp = True
+
+    def release_start(self) -> None:
+        """Let the start segment end at its time; passed on with the next block."""
+        self._wants_release = True
+
+    def continue_start(self, judgements: int) -> None:
+        """Do nothing: the device goes on by itself."""
+
+    def bring_down(self) -> None:
+        """Ramp to 0 V if the loop still runs, and wait for its end; the rows are dropped."""
+        self.request_stop()
+        for _ in self.run():
+            pass
+
+    @property
+    def lateness_us(self) -> tuple[float, float, float, float]:
+        """NaN: no computer can be late."""
+        return (math.nan,) * 4
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The driver's counters."""
+        return dict(self.daq.counters)
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """Images of the held output in the force reading, as the driver knows them."""
+        return self.daq.images
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Where the loop runs, and the driver's remarks."""
+        return (ON_DEVICE, *self.daq.remarks)
+
+    @property
+    def report(self) -> JsonObject:
+        """Statistics as plain data, for the recording."""
+        told = self.statistics.report(int(self.tick.arrays.loop["cycles"][0]))
+        return {**told, **self.daq.statistics, "real_time": {"pacing": "device", "loop": "device"}}
+
+    def _next(self) -> np.ndarray:
+        """The next rows, with what was requested passed on before."""
+        if self._wants_release:
+            self._remote.release()
+            self._wants_release = False
+        if self._wants_ramp:
+            self._remote.ramp()
+            self._wants_ramp = False
+        rows, state = self._remote.take()
+        if state is not None:
+            self._note(state)
+        self.tick.arrays.loop["sample"] = self._remote.expected
+        if rows is None:
+            return self._lost()
+        made = np.ascontiguousarray(rows.rows).view(ROW)[:, 0]
+        self._last = made[-1:].copy()
+        return self.tick.joined(rows.readings, made)
+
+    def _lost(self) -> np.ndarray:
+        """Rows in place of a block that was lost: the oscillator as it would have gone on, and no readings."""
+        readings, made = self.tick.buffers(self._block)
+        readings.fill(np.nan)
+        made[:] = self._last
+        turn = 2.0 * math.pi * float(self._last["frequency_hz"][0]) / self.daq.sample_rate_hz
+        theta = float(self._last["theta_rad"][0]) + turn * np.arange(1, self._block + 1)
+        made["theta_rad"] = np.mod(theta, 2.0 * math.pi)
+        made["phase_error_rad"] = np.nan
+        made["flags"] |= np.uint32(LOST << DEVICE_SHIFT)
+        self._last["theta_rad"] = made["theta_rad"][-1]
+        return self.tick.joined(readings, made)
+
+    def _note(self, state: State) -> None:
+        for piece in state.pieces:
+            if piece.array >= len(self._bytes):
+                continue
+            place = self._bytes[piece.array][piece.offset : piece.offset + len(piece.data)]
+            if place.size == len(piece.data):
+                place[:] = np.frombuffer(piece.data, np.uint8)
+
+    def _finish(self) -> None:
+        """Stop the device once all outcomes are known here; those lost on the way come again with later blocks."""
+        until = time.monotonic() + WHOLE_STATE_S
+        while not self._remote.agrees("outcomes", self.tick.outcomes) and time.monotonic() < until:
+            _, state = self._remote.take()
+            if state is not None:
+                self._note(state)
+        self._remote.stop()
+        self.ended = True
+
+    def _fail(self, failure: DaqError) -> None:
+        self.ended, self.failure = True, failure
+        end_by_driver(self.tick, failure)
+        try:
+            self._remote.stop()
+        except Exception:  # the device may be gone; its watchdog brings the output to 0 V
+            return
+
+
+class DeviceSession:
+    """A bench whose open device runs the loop; as a context manager it ends with the output at 0 V."""
+
+    def __init__(self, daq: DAQ, bench: Bench) -> None:
+        self._daq, self._bench = daq, bench
+        self._loop: DeviceLoop | None = None
+        self.capabilities = daq.capabilities
+        self.identity = {**daq.identity, "loop": "device"}
+        self.latched = daq.latched
+
+    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> None:
+        """Clear what the device had latched; there is no queue. See `rig.loop.session.LocalSession.settle_queue`."""
+        self._daq.clear()
+
+    def start(self, settings: TickSettings) -> DeviceLoop:
+        """Bring the plan to the device and start it there."""
+        daq, bench = self._daq, settings.bench
+        assert isinstance(daq, RunsLoops)
+        tick = Tick(settings, 1.0 + daq.loop_latency_samples)
+        block = max(1, round(ROWS_S * bench.sample_rate_hz))
+        remote = daq.load_loop(tick.arrays, block)
+        remote.begin()
+        self._loop = DeviceLoop(daq, remote, tick, min(block, daq.capabilities.largest_block))
+        return self._loop
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Ramp down if the loop still runs, and wait for its end."""
+        try:
+            if self._loop is not None and not self._loop.ended:
+                self._loop.bring_down()
+        finally:
+            try:
+                self._daq.close()
+            except RigError as failure:  # dropped, so that the recording is not lost
+                warnings.warn(f"the driver failed when it was closed: {failure}", RuntimeWarning, stacklevel=2)
+
+
+def runs_on_device(daq: RunsLoops) -> bool:
+    """Whether the loop of a bench runs on its open device.
+
+    Raises `DaqMismatch` if the bench asks for that and the device has no loop, or another one than this computer.
+    """
+    theirs, why = daq.loop_digest, "the device has no loop of its own"
+    if theirs:
+        from rig.firmware.machine_code import kernels_digest
+
+        ours = kernels_digest()
+        if theirs == ours:
+            return True
+        why = f"the device has another loop ({theirs[:12]}, here {ours[:12]}): build its firmware anew"
+    if daq.loop == "auto":
+        return False
+    raise DaqMismatch(why, field="driver.options.loop", value=daq.loop, allowed="'computer' or 'auto' with this device")
