@@ -129,6 +129,8 @@ static void tell_of_a_change(void)
 static enum vl_status start(uint32_t *value)
 {
     if (vl_state() == VL_IDLE) {
+        if (vl_settings.loop && !vl_tick_is_ready(value))
+            return VL_NOT_ALLOWED;
         vl_in_force = vl_settings;
         vl_about->wire->configure();
         block_is_under_way = false;
@@ -157,6 +159,26 @@ static bool is_at_rest(uint32_t *value)
     return !vl_is_sampling();
 }
 
+/* The host asks the loop on the device for something. */
+static enum vl_status ask_loop(void (*ask_locked)(void), uint32_t *value)
+{
+    if (!vl_is_sampling() || !vl_has_loop()) {
+        *value = vl_state();
+        return VL_WRONG_STATE;
+    }
+    *value = 0;
+    board_lock();
+    ask_locked();
+    board_unlock();
+    return VL_DONE;
+}
+
+static bool knows_loop(void)
+{
+    uint32_t value;
+    return vl_tick_get(VL_P_LOOP, 0, &value);
+}
+
 static enum vl_status carry_out(const struct vl_command *request, uint32_t *value)
 {
     *value = request->value;
@@ -168,8 +190,12 @@ static enum vl_status carry_out(const struct vl_command *request, uint32_t *valu
     case VL_ARM: return vl_arm(request->value, value);
     case VL_DISARM: return vl_disarm(value);
     case VL_CLEAR: return is_at_rest(value) ? vl_clear(value) : VL_WRONG_STATE;
-    default: *value = 0; return VL_UNKNOWN;
+    case VL_RAMP: if (knows_loop()) return ask_loop(vl_tick_ramp_locked, value); break;
+    case VL_RELEASE: if (knows_loop()) return ask_loop(vl_tick_release_locked, value); break;
+    default: break;
     }
+    *value = 0;
+    return VL_UNKNOWN;
 }
 
 static bool is_repeated(const struct vl_command *request)
@@ -181,6 +207,8 @@ static bool is_repeated(const struct vl_command *request)
 
 void vl_take_request(const struct vl_command *request)
 {
+    if (vl_is_sampling() && vl_has_loop())
+        vl_feed(); /* the loop needs nothing of its host, but that it is there */
     if (is_repeated(request)) {
         vl_counters.repeated_requests++;
     } else {
@@ -198,7 +226,7 @@ void vl_take_output(uint64_t first, const uint8_t *counts, uint32_t period, uint
         vl_counters.outputs_while_idle++;
         return;
     }
-    int32_t in_time = vl_keep_outputs(first, counts, vl_present());
+    int32_t in_time = vl_has_loop() ? -1 : vl_keep_outputs(first, counts, vl_present());
     if (in_time < 0) {
         vl_counters.bad_outputs++;
         return;

@@ -15,10 +15,11 @@
 enum { VL_LOWEST_VERSION = 1, VL_VERSION = 2, VL_HEARTBEAT_US = 100000 };
 enum { VL_ARM_KEY = 0x41524D21 };
 
-enum vl_request_code { VL_GET = 1, VL_SET, VL_START, VL_STOP, VL_ARM, VL_DISARM, VL_CLEAR };
+enum vl_request_code { VL_GET = 1, VL_SET, VL_START, VL_STOP, VL_ARM, VL_DISARM, VL_CLEAR, VL_RAMP, VL_RELEASE };
 enum vl_status { VL_DONE, VL_UNKNOWN, VL_NOT_ALLOWED, VL_WRONG_STATE, VL_IS_LATCHED };
 enum vl_state { VL_IDLE, VL_RUNNING, VL_ARMED, VL_LATCHED };
 enum vl_flag { VL_OVERLOAD = 1, VL_OUTPUT_CLIPPED = 2, VL_OUTPUT_HELD = 4, VL_WATCHDOG = 8, VL_EMERGENCY_STOP = 16, VL_OUTPUT_CONTINUED = 32 };
+enum { VL_LOST = 0x8000 }; /* of a sample, beside these flags, as the tick takes it */
 
 enum vl_parameter {
     VL_P_LOWEST_VERSION = 1,
@@ -54,7 +55,14 @@ enum vl_parameter {
     VL_P_WATCHDOG_US = 51,
     VL_P_RAMP_US = 52,
     VL_P_LAYOUT_CRC = 64,
-    VL_P_PING = 65
+    VL_P_PING = 65,
+    VL_P_TICK_DIGEST = 80,
+    VL_P_TICK_ROOM = 81,
+    VL_P_LOOP = 82,
+    VL_P_TICK_BYTES = 83,
+    VL_P_TICK_PERIOD = 84,
+    VL_P_TICK_CRC = 85,
+    VL_P_TICK_FAULT = 86
 };
 
 /* A request or an answer: `code` is the command of one, the status of the other. */
@@ -68,19 +76,24 @@ struct vl_heartbeat {
     uint32_t samples, dropped;
 };
 
-/* A block that has been measured. The counts are little-endian, as they go on the wire. */
+/* A block that has been measured. The counts are little-endian, as they go on the wire; so are readings, rows and state of the loop on
+ * the device. */
 struct vl_samples {
     uint64_t first, clock_us;
     uint32_t dropped;
     uint8_t flags;
     const uint8_t *counts;
     const uint8_t *put_out; /* counts of the converter, where an output was missing; NULL: as handed over */
+    const uint8_t *state;   /* of the loop on the device, after the block: then `counts` are readings and rows. NULL: there is none */
+    uint32_t state_bytes;
 };
 
 /* -- state.c: what all parts know ------------------------------------------------------------------------------------- */
 
 struct vl_settings {
     uint32_t version, rate_mhz, block, queue, watchdog_us, ramp_us;
+    uint32_t loop;        /* 1: the loop runs on the device */
+    uint32_t tick_period; /* entries of a waveform of its records */
 };
 
 extern const struct vl_description *vl_about;
@@ -90,6 +103,8 @@ extern uint32_t vl_boot;
 extern int32_t vl_held; /* the count on the converter */
 
 uint32_t vl_count_bytes(void);
+uint32_t vl_row_bytes(const struct vl_settings *settings);    /* of a sample on the wire: its counts, or its readings and its row */
+uint32_t vl_sample_bytes(const struct vl_settings *settings); /* of a sample in memory: these, and the count that was put out */
 
 /* -- device.c: what happens to it, and when ------------------------------------------------------------------------- */
 
@@ -174,11 +189,14 @@ struct vl_wire {
     void (*send_answer)(const struct vl_command *answer);
     void (*send_heartbeat)(const struct vl_heartbeat *beat);
     void (*send_samples)(const struct vl_samples *samples); /* and before them what was put out, if they have it */
+    bool carries_rows;        /* send_samples takes the loop's rows and state as well: without that there is no loop on the device */
 };
 
 /* -- crc32.c, bytes.h ------------------------------------------------------------------------------------------------------ */
 
 enum { VL_CRC_START = 0 };
 uint32_t vl_crc32(uint32_t crc, const void *bytes, size_t n);
+
+#include "loop.h"
 
 #endif

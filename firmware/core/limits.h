@@ -26,6 +26,11 @@
 /* Blocks beyond the queue by which a host may be early with its outputs. */
 #define VL_BLOCKS_AHEAD 4
 
+/* Bytes for the records of a run, where the loop is on the device (VL_HAS_TICK); a plan of ten points takes some 30 kB. */
+#ifndef VL_TICK_BYTES
+#define VL_TICK_BYTES 262144
+#endif
+
 /* Bytes for blocks that are measured and not sent yet; at least two blocks must fit. */
 #ifndef VL_SAMPLE_BYTES
 #define VL_SAMPLE_BYTES (3 * VL_LARGEST_BLOCK * VL_MOST_CHANNELS * VL_MOST_COUNT_BYTES)

@@ -10,7 +10,8 @@ static uint32_t layout_crcs[1 + VL_VERSION]; /* by version */
 uint32_t vl_largest_block(void)
 {
     uint32_t of_the_wire = vl_about->wire->largest_block();
-    uint32_t of_the_memory = VL_SAMPLE_BYTES / 2 / ((vl_about->n_channels + 1) * vl_count_bytes()); /* with what was put out */
+    uint32_t of_state = vl_settings.loop ? VL_STATE_BYTES : 0;
+    uint32_t of_the_memory = (VL_SAMPLE_BYTES / 2 - of_state) / vl_sample_bytes(&vl_settings);
     uint32_t largest = of_the_wire < of_the_memory ? of_the_wire : of_the_memory;
     return largest < VL_LARGEST_BLOCK ? largest : VL_LARGEST_BLOCK;
 }
@@ -43,8 +44,10 @@ void vl_begin_parameters(uint32_t boot)
         .queue = 1,
         .watchdog_us = within(100000, vl_about->shortest_watchdog_us, vl_about->longest_watchdog_us),
         .ramp_us = smaller(50000, vl_about->longest_watchdog_us),
+        .tick_period = 1,
     };
     vl_in_force = vl_settings;
+    vl_begin_tick();
 }
 
 static uint32_t float_word(float value)
@@ -145,13 +148,26 @@ enum vl_status vl_get(uint8_t parameter, uint8_t item, uint32_t *value)
 {
     *value = 0;
     bool is_known = parameter == VL_P_PING || (item == 0 && get_single(parameter, value))
-                    || get_by_channel(parameter, item, value) || get_by_word(parameter, item, value);
+                    || get_by_channel(parameter, item, value) || get_by_word(parameter, item, value)
+                    || vl_tick_get(parameter, item, value);
     return is_known ? VL_DONE : VL_UNKNOWN;
+}
+
+/* Whether the ring and the wire have room for a block with the loop's rows: 1, or 0. */
+static uint32_t holds_block_of_loop(void)
+{
+    const uint32_t before = vl_settings.loop;
+    vl_settings.loop = 1;
+    const uint32_t largest = vl_largest_block();
+    vl_settings.loop = before;
+    return vl_settings.block <= largest;
 }
 
 /* What may be set, and between what bounds. NULL: it cannot be set. */
 static uint32_t *setting(uint8_t parameter, uint32_t *lowest, uint32_t *highest)
 {
+    uint32_t of_tick;
+    const bool has_tick = vl_tick_get(VL_P_LOOP, 0, &of_tick);
     *lowest = 1;
     switch (parameter) {
     case VL_P_VERSION: *highest = VL_VERSION; return &vl_settings.version;
@@ -166,12 +182,21 @@ static uint32_t *setting(uint8_t parameter, uint32_t *lowest, uint32_t *highest)
         *lowest = 0;
         *highest = vl_about->longest_watchdog_us;
         return &vl_settings.ramp_us;
+    case VL_P_LOOP:
+        *lowest = 0;
+        *highest = holds_block_of_loop();
+        return has_tick ? &vl_settings.loop : NULL;
+    case VL_P_TICK_PERIOD:
+        *highest = INT32_MAX;
+        return has_tick ? &vl_settings.tick_period : NULL;
     default: return NULL;
     }
 }
 
 enum vl_status vl_set(uint8_t parameter, uint8_t item, uint32_t *value)
 {
+    if (parameter == VL_P_TICK_BYTES)
+        return vl_tick_resize(item, value);
     uint32_t lowest, highest, wanted = *value;
     uint32_t *set = setting(parameter, &lowest, &highest);
     if (!set || item) {

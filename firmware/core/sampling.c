@@ -18,12 +18,13 @@ static uint8_t put_out[VL_LARGEST_BLOCK * VL_MOST_COUNT_BYTES]; /* counts of the
 static uint8_t memory[VL_SAMPLE_BYTES];
 static struct vl_samples blocks[VL_MOST_BLOCKS];
 static uint32_t n_blocks, block_bytes;
-static uint32_t readback_bytes;  /* of them, for what was put out: none in version 1 */
+static uint32_t readback_bytes;  /* of them, for what was put out: none in version 1, and none with the loop on the device */
+static bool has_failed;          /* the compiled tick */
 static _Atomic uint32_t written, read; /* blocks, modulo 2^32 */
 static uint32_t write_at, read_at; /* their places in the ring */
 static uint64_t first;           /* of the block under way */
 static uint32_t row;             /* of the block under way */
-static uint8_t *into;            /* where its next row goes; NULL: there is no room for this block */
+static uint8_t *into;            /* where its next row goes, with the loop where it begins; NULL: there is no room for this block */
 static _Atomic uint32_t dropped;
 static uint64_t handed_over;
 
@@ -56,8 +57,11 @@ void vl_restart_sampling(void)
     first_expected = (uint64_t)vl_in_force.queue * vl_in_force.block;
     seen = 0;
     is_spoilt = false;
-    readback_bytes = vl_in_force.version > 1 ? vl_in_force.block * vl_count_bytes() : 0;
-    block_bytes = vl_in_force.block * vl_about->n_channels * vl_count_bytes() + readback_bytes;
+    has_failed = false;
+    readback_bytes = vl_in_force.version > 1 && !vl_has_loop() ? vl_in_force.block * vl_count_bytes() : 0;
+    block_bytes = vl_in_force.block * vl_row_bytes(&vl_in_force) + (vl_has_loop() ? VL_STATE_BYTES : readback_bytes);
+    if (vl_has_loop())
+        vl_restart_tick();
     n_blocks = VL_SAMPLE_BYTES / block_bytes < VL_MOST_BLOCKS ? VL_SAMPLE_BYTES / block_bytes : VL_MOST_BLOCKS;
     atomic_store(&written, 0);
     atomic_store(&read, 0);
@@ -105,6 +109,11 @@ uint32_t vl_block(void)
     return vl_in_force.block;
 }
 
+uint32_t vl_ahead(void)
+{
+    return vl_has_loop() ? 1 : vl_in_force.block;
+}
+
 uint32_t vl_queue(void)
 {
     return vl_in_force.queue;
@@ -118,9 +127,11 @@ static int32_t clipped(int32_t count)
     return count < 0 ? lowest_count : highest_count;
 }
 
-/* The output of an armed device: the one that is due, or the vibration's next one, or the one before. */
+/* The output of an armed device: the loop's, or the one that is due, or the vibration's next one, or the one before. */
 static int32_t armed_output(bool has_come, int32_t count, uint64_t index)
 {
+    if (vl_has_loop())
+        return clipped(vl_tick_output());
     if (has_come)
         return clipped(count);
     bool goes_on = vl_continue(index, &count);
@@ -161,11 +172,28 @@ static uint32_t after(uint32_t place)
     return place + 1 == n_blocks ? 0 : place + 1;
 }
 
+static bool has_room(void)
+{
+    return atomic_load_explicit(&written, memory_order_relaxed) - atomic_load(&read) < n_blocks;
+}
+
 /* Find room for a block, or note that there is none. */
 static void begin_block(void)
 {
-    uint32_t waiting = atomic_load_explicit(&written, memory_order_relaxed) - atomic_load(&read);
-    into = waiting < n_blocks ? memory + write_at * block_bytes : NULL;
+    into = has_room() ? memory + write_at * block_bytes : NULL;
+}
+
+/* With the loop on the device: a sample goes through it, and its row into the block. */
+static void run_loop(const int32_t counts[], uint16_t flags)
+{
+    if (!has_failed && !vl_tick(counts, flags)) {
+        has_failed = true;
+        vl_counters.loop_failures++;
+        vl_emergency_stop_locked();
+    }
+    is_spoilt = is_spoilt || has_failed;
+    if (into)
+        vl_keep_row(into, row);
 }
 
 /* Behind the samples of a block, what was put out if it is not all that was handed over; else NULL. */
@@ -183,13 +211,17 @@ static void end_block(void)
     if (seen & VL_OUTPUT_CONTINUED)
         vl_counters.continued_blocks++;
     if (into && !is_spoilt) {
+        uint8_t *const block = memory + write_at * block_bytes;
+        uint8_t *const behind = block + vl_in_force.block * vl_row_bytes(&vl_in_force);
         blocks[write_at] = (struct vl_samples){
             .first = first,
             .clock_us = board_clock_us(),
             .dropped = atomic_load_explicit(&dropped, memory_order_relaxed),
             .flags = (uint8_t)(seen | vl_latched()),
-            .counts = memory + write_at * block_bytes,
-            .put_out = keep_readback(memory + (write_at + 1) * block_bytes),
+            .counts = block,
+            .put_out = keep_readback(block + block_bytes),
+            .state = vl_has_loop() ? behind : NULL,
+            .state_bytes = vl_has_loop() ? vl_tick_state(behind) : 0,
         };
         write_at = after(write_at);
         atomic_fetch_add_explicit(&written, 1, memory_order_release);
@@ -216,8 +248,11 @@ void vl_miss(void)
     vl_output();
     if (row == 0)
         begin_block();
-    is_spoilt = true;
     vl_counters.missed_instants++;
+    if (vl_has_loop())
+        run_loop(NULL, VL_LOST);
+    else
+        is_spoilt = true;
     end_row();
 }
 
@@ -229,7 +264,9 @@ void vl_input(const int32_t counts[], bool overload)
         begin_block();
     if (overload)
         seen |= VL_OVERLOAD;
-    if (into) {
+    if (vl_has_loop()) {
+        run_loop(counts, overload ? VL_OVERLOAD : 0);
+    } else if (into) {
         const uint32_t n_channels = vl_about->n_channels, n_bytes = vl_count_bytes();
         for (uint32_t channel = 0; channel < n_channels; channel++)
             into = vl_put_count(into, counts[channel], n_bytes);
@@ -258,6 +295,8 @@ bool vl_block_is_due(void)
     uint64_t next = vl_next_instant();
     if (!is_on)
         return false;
+    if (vl_has_loop())
+        return has_room();
     if (next < first_expected || vl_has_next_block())
         return true;
     return vl_is_coming_down(next - vl_in_force.block);

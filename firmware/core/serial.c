@@ -3,7 +3,8 @@
 #include "bytes.h"
 #include "device.h"
 
-enum { REQUEST = 1, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK };
+enum { REQUEST = 1, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK, RECORD, STATE, ROWS };
+enum { RECORD_HEAD = 12, MOST_OF_RECORD = 512 };
 enum { HEADER = 4, COMMAND_SIZE = 12, SAMPLES_HEAD = 28, READBACK_HEAD = 12, STOP_SIZE = 5, CRC_SIZE = 4 };
 enum { FIRST_OUTPUT_HEAD = 12, OUTPUT_HEAD = 20 }; /* in version 1, and since then with the period and the ramp */
 enum { AT_A_TIME = 128 }; /* bytes read at a call */
@@ -22,7 +23,7 @@ static size_t n_line, n_sent; /* bytes of the frame, and those that the line has
 static size_t code_at;        /* where the length of the present piece goes */
 static bool was_cut;          /* the piece before had 254 bytes, so that the present one may be left out */
 static uint32_t crc;
-static const struct vl_samples *next; /* to be sent after what was put out; NULL: none */
+static const struct vl_samples *next; /* to be sent after what was put out, or after the loop's state; NULL: none */
 
 static void end_piece(void)
 {
@@ -55,7 +56,7 @@ static void put(const uint8_t *bytes, size_t n)
 static void begin_frame(uint8_t type, uint16_t number)
 {
     n_line = n_sent = 0;
-    if (type != SAMPLES && type != READBACK)
+    if (type == ANSWER || type == HEARTBEAT)
         line[n_line++] = 0;
     code_at = n_line++;
     was_cut = false;
@@ -104,9 +105,16 @@ static void put_samples(const struct vl_samples *samples)
     uint8_t head[SAMPLES_HEAD - HEADER] = {0};
     vl_put(vl_put(vl_put(head, samples->first, 8), samples->clock_us, 8), samples->dropped, 4);
     head[20] = samples->flags;
-    begin_frame(SAMPLES, block_number(samples));
+    begin_frame(samples->state ? ROWS : SAMPLES, block_number(samples));
     put(head, sizeof head);
-    put(samples->counts, vl_in_force.block * vl_about->n_channels * vl_count_bytes());
+    put(samples->counts, vl_in_force.block * vl_row_bytes(&vl_in_force));
+    end_frame();
+}
+
+static void put_state(const struct vl_samples *samples)
+{
+    begin_frame(STATE, block_number(samples));
+    put(samples->state, samples->state_bytes);
     end_frame();
 }
 
@@ -122,8 +130,10 @@ static void put_readback(const struct vl_samples *samples)
 
 static void send_samples(const struct vl_samples *samples)
 {
-    next = samples->put_out ? samples : NULL;
-    if (next)
+    next = samples->put_out || samples->state ? samples : NULL;
+    if (samples->state)
+        put_state(samples);
+    else if (next)
         put_readback(samples);
     else
         put_samples(samples);
@@ -143,7 +153,11 @@ static bool is_idle(void)
 
 /* -- receiving -------------------------------------------------------------------------------------------------------------- */
 
-enum { MOST_RECEIVED = OUTPUT_HEAD + VL_LARGEST_BLOCK * VL_MOST_COUNT_BYTES + CRC_SIZE };
+enum {
+    OF_OUTPUTS = OUTPUT_HEAD + VL_LARGEST_BLOCK * VL_MOST_COUNT_BYTES,
+    OF_RECORD = RECORD_HEAD + MOST_OF_RECORD,
+    MOST_RECEIVED = (OF_OUTPUTS > OF_RECORD ? OF_OUTPUTS : OF_RECORD) + CRC_SIZE
+};
 
 static uint8_t payload[MOST_RECEIVED + 1];
 static size_t n_payload;
@@ -201,6 +215,13 @@ static void take_output(uint8_t version)
         vl_take_output(first, payload + OUTPUT_HEAD, vl_u32(payload + 12), vl_u32(payload + 16));
 }
 
+/* A piece of the records of the loop on the device. */
+static bool take_record(size_t size)
+{
+    return size > RECORD_HEAD && size <= RECORD_HEAD + MOST_OF_RECORD
+           && vl_take_record(payload[4], vl_u32(payload + 8), payload + RECORD_HEAD, (uint32_t)(size - RECORD_HEAD));
+}
+
 static void take_message(size_t size)
 {
     uint8_t version = payload[0], type = payload[1];
@@ -210,7 +231,7 @@ static void take_message(size_t size)
         vl_take_emergency_stop();
     else if (type == OUTPUT && version == vl_settings.version && output_size && size == output_size)
         take_output(version);
-    else
+    else if (type != RECORD || version != vl_settings.version || !take_record(size))
         vl_counters.malformed++;
 }
 
@@ -248,7 +269,7 @@ static bool fits(const struct vl_description *about)
 
 static uint32_t largest_block(void)
 {
-    return (MOST_SENT - SAMPLES_HEAD) / (vl_about->n_channels * vl_count_bytes());
+    return (MOST_SENT - SAMPLES_HEAD) / vl_row_bytes(&vl_settings);
 }
 
 static uint32_t layout_crc(uint32_t version)
@@ -288,4 +309,5 @@ const struct vl_wire vl_serial = {
     .send_answer = send_answer,
     .send_heartbeat = send_heartbeat,
     .send_samples = send_samples,
+    .carries_rows = true,
 };

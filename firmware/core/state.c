@@ -12,3 +12,13 @@ uint32_t vl_count_bytes(void)
 {
     return vl_about->bits / 8;
 }
+
+uint32_t vl_sample_bytes(const struct vl_settings *settings)
+{
+    return settings->loop ? vl_row_bytes(settings) : (vl_about->n_channels + 1) * vl_count_bytes();
+}
+
+uint32_t vl_row_bytes(const struct vl_settings *settings)
+{
+    return settings->loop ? vl_about->n_channels * (uint32_t)sizeof(float) + VL_ROW_BYTES : vl_about->n_channels * vl_count_bytes();
+}

@@ -8,7 +8,8 @@
  *   vl_serve      again and again from its main loop, at least every millisecond;
  *   vl_output     at every sample instant, from the interrupt of the sampling timer: the count that goes on the converter now;
  *   vl_input      with the counts that the inputs had at that instant, from the same interrupt or later. Those of a block come
- *                 before vl_output is called for the first instant of the next block.
+ *                 before vl_output is called for the first instant of the next block; where the loop runs on the device, those of
+ *                 an instant before it is called for the next instant (vl_ahead).
  *
  * vl_output, vl_input, vl_miss and vl_watch may interrupt vl_serve anywhere but between board_lock and board_unlock. They must not
  * interrupt each other.
@@ -82,8 +83,12 @@ void vl_watch(void);
 uint32_t vl_block(void);
 uint32_t vl_queue(void);
 
+/* Instants for which vl_output may be called before the inputs of the first of them are handed to vl_input: a block, but 1 while the
+ * loop runs on the device, for it needs the inputs of every instant for its next output. */
+uint32_t vl_ahead(void);
+
 /* For devices in software that wait for their host instead of a clock (lockstep): whether the next block can be measured, for
- * its outputs have come or none are needed. */
+ * its outputs have come or none are needed; while the loop runs on the device, for there is room for its rows. */
 bool vl_block_is_due(void);
 
 /* What has happened since the reset, for a board's own diagnosis. */
@@ -106,6 +111,7 @@ struct vl_counters {
     uint32_t incomplete_blocks;
     uint32_t resynchronised;
     uint32_t continued_blocks;     /* blocks in which the vibration went on without an output */
+    uint32_t loop_failures;        /* times that the compiled tick has failed, each an emergency stop */
 };
 
 extern struct vl_counters vl_counters;

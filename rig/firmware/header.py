@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,6 +55,36 @@ def _counts(name: str, array: np.ndarray) -> list[str]:
     return [f"n_{name}", f"{name}_length"][: array.ndim]
 
 
+class _Run(NamedTuple):
+    """Numbers of double precision that lie in a row in a record, and again, ``times`` in all, every ``stride`` bytes."""
+
+    at: int
+    numbers: int
+    times: int = 1
+    stride: int = 0
+
+
+def _doubles(dtype: np.dtype, at: int = 0) -> list[_Run]:
+    """Where a record from ``at`` on has numbers of double precision; a complex one is two."""
+    base, count = dtype.base, int(np.prod(dtype.shape, dtype=int))
+    if base.names is None:
+        return [_Run(at, count * base.itemsize // 8)] if base.str[1:] in ("f8", "c16") else []
+    out: list[_Run] = []
+    for name in base.names:
+        kind, offset = base.fields[name][:2]  # type: ignore[index]  # it has names
+        for run in _doubles(kind, at + offset):
+            if out and run.times == out[-1].times == 1 and out[-1].at + 8 * out[-1].numbers == run.at:
+                out[-1] = out[-1]._replace(numbers=out[-1].numbers + run.numbers)
+            else:
+                out.append(run)
+    return [run._replace(times=count, stride=base.itemsize) for run in out] if count > 1 else out
+
+
+def _listed(name: str, lines: list[str]) -> str:
+    """A macro that does the same with every item of a list."""
+    return " \\\n".join([f"#define {name}(DO)", *(f"    DO({line})" for line in lines)])
+
+
 def _passed(address: str, size: int, lengths: list[str]) -> str:
     """How numba takes an array: two owners, number of items, bytes of one, address, lengths, steps in bytes."""
     steps = [" * ".join([f"(int64_t){size}", *lengths[axis + 1 :]]) for axis in range(len(lengths))]
@@ -82,11 +113,15 @@ def header(arguments: Arguments, digest: str) -> str:
         lengths = ["1"] if name == "continuation" else ["n", "n_channels"][: array.ndim]
         given.append(_passed(f"s->{name}", array.itemsize, lengths))
     samples = [f"    {types[name]} *{name};" for name in arguments._fields[1:]]
+    types_of = {name: array.dtype for name, array in arguments.t._asdict().items()}
+    doubles = [f"{name}, {', '.join(map(str, run))}" for name, one in types_of.items() for run in _doubles(one)]
     return _TEXT.format(
         digest=digest,
         complex=COMPLEX,
         records="\n".join(records.text),
         bundle="\n".join(bundle),
+        arrays=_listed("TICK_ARRAYS", [f"{name}, {types[name]}" for name in arguments.t._fields]),
+        doubles=_listed("TICK_DOUBLES", doubles),
         samples="\n".join(samples),
         parameters=_parameters(types, arrays),
         given=",\n        ".join(given),
@@ -123,6 +158,13 @@ extern const char {told}[65];
 struct tick_arrays {{
 {bundle}
 }};
+
+/* The arrays in this order, with the type of an item: DO(name, type). */
+{arrays}
+
+/* Where their records have numbers of double precision, for whoever checks them: DO(name, bytes from the record's beginning,
+ * how many there are in a row, how often such a row comes, and every how many bytes). */
+{doubles}
 
 /* A block of samples: volts [n][n_channels], the device's flags [n], what was put out instead [n] (V, else NaN); filled are
  * readings [n][n_channels], rows [n], outputs [n] (V), and how they go on (one record). */

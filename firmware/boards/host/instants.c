@@ -1,5 +1,6 @@
 /* Sample instants. By the clock they are a POSIX timer's, whose signal handler is the sampling interrupt; it may come anywhere in
- * the core, as on a chip. In lockstep the main loop measures a block as soon as its outputs have come.
+ * the core, as on a chip. In lockstep the main loop measures a block as soon as its outputs have come. While the loop runs on the
+ * device, every instant is measured before the next.
  *
  * A computer may not schedule this process for a while. Beyond half the queue the device's clock stands still for that time, so
  * that the host has the other half to answer. Instants that are less late than that run at once. */
@@ -26,7 +27,8 @@ static uint64_t period_ns, period_rest;   /* of a sample: whole ns, and the rest
 static _Atomic uint64_t due_ns;           /* the next instant */
 static uint64_t due_rest;
 static uint64_t patience_ns;              /* half the queue: by how much instants may be late */
-static uint32_t rate_mhz, collected;      /* collected: outputs of the block under way */
+static uint32_t rate_mhz, collected;      /* collected: outputs for which nothing is measured yet */
+static uint32_t logged;                   /* samples of the block under way that are measured */
 static _Atomic uint64_t stalled_ns, told_us;
 
 static uint64_t monotonic_ns(void)
@@ -88,7 +90,11 @@ void sampling_end_without_structure(void)
 
 static void measure(uint32_t n)
 {
-    output_log_block();
+    logged += n;
+    if (logged == vl_block()) {
+        output_log_block();
+        logged = 0;
+    }
     if (!plant_measure(&host_structure, n))
         sampling_end_without_structure();
 }
@@ -128,7 +134,7 @@ static void interrupt(int number)
         uint64_t now_ns = monotonic_ns();
         stand_still(now_ns);
         while (due_ns <= now_ns) {
-            if (collected == vl_block()) {
+            if (collected == vl_ahead()) {
                 measure(collected);
                 collected = 0;
             }
@@ -177,7 +183,7 @@ void board_start_sampling(uint32_t rate)
     period_ns = MHZ_NS / rate;
     period_rest = MHZ_NS % rate;
     patience_ns = (uint64_t)vl_queue() * vl_block() * period_ns / 2;
-    collected = 0;
+    collected = logged = 0;
     due_rest = 0;
     due_ns = monotonic_ns();
     is_on = true;
@@ -200,9 +206,11 @@ bool sampling_serve(void)
         rest_if_due();
     if (!host_structure.lockstep || !vl_block_is_due())
         return false;
-    const uint32_t n = vl_block();
-    for (collected = 0; collected < n;)
-        take_instant();
-    measure(n);
+    const uint32_t n = vl_ahead();
+    for (uint32_t left = vl_block(); left > 0; left -= n) {
+        for (collected = 0; collected < n;)
+            take_instant();
+        measure(n);
+    }
     return true;
 }

@@ -112,6 +112,7 @@ static void print_counters(void)
     PRINT(emergency_stops);
     PRINT(held_blocks);
     PRINT(continued_blocks);
+    PRINT(loop_failures);
     PRINT(dropped_blocks);
     PRINT(bad_outputs);
     PRINT(late_outputs);
