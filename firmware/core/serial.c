@@ -231,7 +231,7 @@ static void take_message(size_t size)
         vl_take_emergency_stop();
     else if (type == OUTPUT && version == vl_settings.version && output_size && size == output_size)
         take_output(version);
-    else if (type != RECORD || version != vl_settings.version || !take_record(size))
+    else if (type != RECORD || version == VL_LOWEST_VERSION || version != vl_settings.version || !take_record(size))
         vl_counters.malformed++;
 }
 

@@ -64,7 +64,7 @@ static uint32_t end_of(uint32_t place)
 bool vl_tick_get(uint8_t parameter, uint8_t item, uint32_t *value)
 {
     enum { DIGEST_WORDS = 16 };
-    if (!vl_about->wire->carries_rows)
+    if (!vl_about->wire->carries_rows || vl_settings.version == VL_LOWEST_VERSION)
         return false;
     if (parameter == VL_P_TICK_DIGEST && item < DIGEST_WORDS)
         *value = vl_u32((const uint8_t *)vibrolock_tick_digest + 4 * item);
@@ -87,8 +87,8 @@ bool vl_tick_get(uint8_t parameter, uint8_t item, uint32_t *value)
 
 enum vl_status vl_tick_resize(uint8_t place, uint32_t *bytes)
 {
-    const uint32_t wanted = *bytes;
-    if (place >= VL_TICK_ARRAYS) {
+    uint32_t wanted = *bytes, before;
+    if (!vl_tick_get(VL_P_TICK_BYTES, place, &before)) {
         *bytes = 0;
         return VL_UNKNOWN;
     }

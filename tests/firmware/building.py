@@ -3,12 +3,14 @@
 import os
 import shutil
 import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
 import pytest
 
+from rig.firmware.build import build_tick
 from tests.sharing import made_once, shared_folder
 
 FOLDER = Path(__file__).parents[2] / "firmware"
@@ -25,15 +27,30 @@ def _made(target: str) -> Path:
     return program
 
 
-def _make(target: str, folder: Path) -> None:
+def _make(target: str, folder: Path, *variables: str) -> None:
     done = subprocess.run(
-        ["make", "-C", str(FOLDER), f"BUILD={folder}", target],
+        ["make", "-C", str(FOLDER), f"BUILD={folder}", *variables, target],
         capture_output=True,
         text=True,
         timeout=MAKING_S,
         check=False,
     )
     assert done.returncode == 0, f"make {target}:\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+
+
+def built_with_loop(target: str) -> Path:
+    """The program of a target (``host``, ``host-sanitized``) with the compiled tick linked in, built once.
+
+    Skips or fails as `need` does, also where this system's object files are not those of the tick.
+    """
+    need(*HOSTS)
+    if sys.platform != "linux":
+        do_without("object files of this system are no ELF files")
+    tick = made_once(shared_folder() / "tick-host", lambda folder: build_tick("host", folder) and None)
+    folder = made_once(
+        shared_folder() / "firmware" / f"{target}-with-loop", lambda folder: _make(target, folder, f"TICK={tick}")
+    )
+    return folder / target
 
 
 @cache

@@ -34,7 +34,7 @@ NODE = 3
 class Board:
     """The program with its pipes, and the far end of its line."""
 
-    def __init__(self, text: str, *arguments: str) -> None:
+    def __init__(self, text: str, *arguments: str, program: Path | None = None) -> None:
         self.line = open_pseudo_terminal()
         os.set_blocking(self.line.far_descriptor, False)
         self.requests, output = os.pipe()
@@ -42,7 +42,7 @@ class Board:
         descriptors = {"--plant-in": input_, "--plant-out": output, "--line": self.line.descriptor}
         words = [word for name, one in descriptors.items() for word in (name, str(one))]
         self.child = subprocess.Popen(
-            [built("host-sanitized"), *words, *arguments],
+            [program or built("host-sanitized"), *words, *arguments],
             pass_fds=(input_, output, self.line.descriptor),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
