@@ -7,6 +7,7 @@
 
 static volatile bool is_on;
 static volatile bool has_output; /* an output has come since START */
+static volatile bool awaits_arm; /* the loop on the device begins with the first instant after ARM: until then nothing is counted */
 static volatile uint32_t instants;
 
 static int32_t lowest_count, highest_count; /* of the converter's range */
@@ -54,6 +55,7 @@ void vl_restart_sampling(void)
     vl_clear_outputs();
     vl_held = 0;
     has_output = false;
+    awaits_arm = vl_has_loop();
     first_expected = (uint64_t)vl_in_force.queue * vl_in_force.block;
     seen = 0;
     is_spoilt = false;
@@ -156,6 +158,9 @@ int32_t vl_output(void)
     if (board_stop_is_pressed() && !(vl_latched() & VL_EMERGENCY_STOP))
         vl_emergency_stop_locked();
     vl_watch();
+    awaits_arm = awaits_arm && vl_state() != VL_ARMED;
+    if (awaits_arm)
+        return 0;
     uint64_t index = vl_next_instant();
     int32_t count = 0;
     bool has_come = vl_next_output(&count);
@@ -246,6 +251,8 @@ void vl_miss(void)
     if (!is_on)
         return;
     vl_output();
+    if (awaits_arm)
+        return;
     if (row == 0)
         begin_block();
     vl_counters.missed_instants++;
@@ -258,7 +265,7 @@ void vl_miss(void)
 
 void vl_input(const int32_t counts[], bool overload)
 {
-    if (!is_on)
+    if (!is_on || awaits_arm)
         return;
     if (row == 0)
         begin_block();
@@ -296,7 +303,7 @@ bool vl_block_is_due(void)
     if (!is_on)
         return false;
     if (vl_has_loop())
-        return has_room();
+        return has_room() && !(awaits_arm && vl_state() != VL_ARMED);
     if (next < first_expected || vl_has_next_block())
         return true;
     return vl_is_coming_down(next - vl_in_force.block);

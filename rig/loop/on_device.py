@@ -32,6 +32,10 @@ class RemoteLoop(Protocol):
     """A run of a loop on a device."""
 
     @property
+    def block(self) -> int:
+        """Rows that the device sends at a time."""
+
+    @property
     def expected(self) -> int:
         """Index of the first sample of the next block."""
 
@@ -71,7 +75,7 @@ class RunsLoops(Protocol):
         """Delay from an output to its effect where the device runs the loop."""
 
     def load_loop(self, arrays: TickArrays, block: int) -> RemoteLoop:
-        """Bring the records of a run to the open device."""
+        """Bring the records of a run to the open device, which then sends at most ``block`` rows at a time."""
 
 
 class DeviceLoop:
@@ -82,12 +86,12 @@ class DeviceLoop:
 
     failure: DaqError | None
 
-    def __init__(self, daq: DAQ, remote: RemoteLoop, tick: Tick, block: int) -> None:
+    def __init__(self, daq: DAQ, remote: RemoteLoop, tick: Tick) -> None:
         self.daq, self.tick = daq, tick
         self.failure, self.cause = None, ""
         self.statistics = LoopStatistics(daq.sample_rate_hz)
         self.ended = False
-        self._remote, self._block = remote, block
+        self._remote, self._block = remote, remote.block
         self._bytes = [array.reshape(-1).view(np.uint8) for array in tick.arrays]
         self._last = np.zeros(1, ROW)
         self._wants_ramp = self._wants_release = False
@@ -233,10 +237,9 @@ class DeviceSession:
         daq, bench = self._daq, settings.bench
         assert isinstance(daq, RunsLoops)
         tick = Tick(settings, 1.0 + daq.loop_latency_samples)
-        block = max(1, round(ROWS_S * bench.sample_rate_hz))
-        remote = daq.load_loop(tick.arrays, block)
+        remote = daq.load_loop(tick.arrays, max(1, round(ROWS_S * bench.sample_rate_hz)))
         remote.begin()
-        self._loop = DeviceLoop(daq, remote, tick, min(block, daq.capabilities.largest_block))
+        self._loop = DeviceLoop(daq, remote, tick)
         return self._loop
 
     def __enter__(self) -> Self:

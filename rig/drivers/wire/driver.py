@@ -226,13 +226,10 @@ class WireDAQ(DAQ):
         return HOLD_SAMPLES + self.filter_delay_samples
 
     def load_loop(self, arrays: TickArrays, block: int) -> RemoteLoop:
-        """Bring the records of a run to the open device; ``block``: rows that it sends at a time. Raises `DaqError`."""
-        connection, facts = self._connection, self._facts
-        assert connection is not None
-        assert facts is not None
-        rows = min(block, facts.largest_block)
-        stream = Stream(len(self.channels), rows, self.sample_rate_hz, facts.bits, 1, loop=True)
-        self._streaming = loop = RemoteLoop(connection, stream, self._options, arrays)
+        """Bring the records of a run to the open device; ``block``: most rows that it sends at a time. Raises `DaqError`."""
+        assert self._connection is not None
+        loop = RemoteLoop(self._connection, self.sample_rate_hz, block, self._options, arrays)
+        self._streaming = loop
         return loop
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:

@@ -56,7 +56,10 @@ class DeviceFacts:
 
 
 def negotiate(dialogue: Dialogue, latest: int = VERSION) -> None:
-    """Agree on the latest version of the protocol that both speak, up to ``latest``; raise `DaqProtocol` if there is none."""
+    """Agree on the latest version of the protocol that both speak, up to ``latest``; raise `DaqProtocol` if there is none.
+
+    A device that can run the loop is told that the host does.
+    """
     lowest, highest = dialogue.get(Parameter.LOWEST_VERSION), dialogue.get(Parameter.HIGHEST_VERSION)
     ours = min(dialogue.link.highest_version, latest)
     version = min(highest, ours)
@@ -67,6 +70,8 @@ def negotiate(dialogue: Dialogue, latest: int = VERSION) -> None:
         )
     dialogue.do(Command.SET, Parameter.VERSION, value=version)
     dialogue.link.speak(version)
+    if version > LOWEST_VERSION:  # most devices do not know it; an earlier host may have left another value
+        dialogue.ask(Command.SET, Parameter.LOOP, value=0)
 
 
 def read_facts(dialogue: Dialogue) -> DeviceFacts:

@@ -36,11 +36,18 @@ class RemoteLoop:
     begins with the name of the port.
     """
 
-    def __init__(self, connection: Connection, stream: Stream, options: WireOptions, arrays: TickArrays) -> None:
+    def __init__(
+        self, connection: Connection, rate_hz: float, block: int, options: WireOptions, arrays: TickArrays
+    ) -> None:
         facts = connection.facts
         assert facts is not None
         self._connection, self._dialogue, self._arrays = connection, connection.dialogue, arrays
-        self._name, self._block = connection.link.name, stream.block
+        self._name = connection.link.name
+        connection.set(Parameter.BLOCK, 1, "block", 1, "samples")  # the largest one depends on who runs the loop
+        connection.set(Parameter.LOOP, 1, "driver.options.loop", 1, "")
+        self.block = min(block, self._dialogue.get(Parameter.LARGEST_BLOCK))
+        """Rows that the device sends at a time."""
+        stream = Stream(len(facts.names), self.block, rate_hz, facts.bits, 1, loop=True)
         connection.check_capacity(stream)
         connection.check_latch()
         wait_s = loop_watchdog_s(options, facts.watchdog_s, moves=not facts.simulated)
@@ -87,8 +94,8 @@ class RemoteLoop:
         if rows.flags:
             for bit, name in enumerate(FLAG_NAMES):
                 if rows.flags & (1 << bit):
-                    self.flag_counts[name] += self._block
-        end, state = rows.first + self._block, None
+                    self.flag_counts[name] += self.block
+        end, state = rows.first + self.block, None
         while self._states and self._states[0].sample <= end:
             state = self._states.popleft()
         return rows, state if state is not None and state.sample == end else None

@@ -20,16 +20,13 @@ FLAG_NAMES = tuple(str(flag.name).lower() for flag in DeviceFlag)
 
 
 def set_up(connection: Connection, stream: Stream, wait_s: float, ramp_s: float) -> None:
-    """Set what a run needs: rate, block, queue, watchdog and its ramp, and who runs the loop."""
-    put, facts = connection.set, connection.facts
-    assert facts is not None
+    """Set what a run needs: rate, block, queue, watchdog and its ramp."""
+    put = connection.set
     put(Parameter.RATE_MHZ, round(1e3 * stream.rate_hz), "sample_rate_hz", 1e-3, "Hz")
     put(Parameter.BLOCK, stream.block, "block", 1, "samples")
     put(Parameter.QUEUE, stream.queue, "driver.options.queue_blocks", 1, "blocks")
     put(Parameter.WATCHDOG_US, round(1e6 * wait_s), "driver.options.watchdog_s", 1e-6, "s")
     put(Parameter.RAMP_US, round(1e6 * ramp_s), "driver.options.ramp_s", 1e-6, "s")
-    if facts.loop_digest:
-        put(Parameter.LOOP, int(stream.loop), "driver.options.loop", 1, "(0 computer, 1 device)")
     connection.link.configure(stream)
 
 
