@@ -2,6 +2,7 @@
 
 import os
 import select
+import signal
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -21,6 +22,7 @@ from rig.emulator.settings import EmulatorSettings
 from rig.firmware.signature import arguments_for
 from rig.tick.kernels import tick_block
 from rig.tick.layout import ROW, TickArrays
+from rig.tick.safety.layout import GuardMode
 from rig.tick.sequencer.segments import Segment
 from rig.tick.tick import Tick, TickSettings
 from rig.wire.messages import (
@@ -60,9 +62,11 @@ def bench_for_loop() -> Bench:
 
 
 def settings_for(*levels: float, segments: list[Segment] | None = None, **kwargs: Any) -> TickSettings:
-    """A short plan in volts on that bench."""
+    """A plan in volts on that bench, by default one that gets to its levels slowly."""
     plan = point_segments(*(levels or (0.2, 0.4))) if segments is None else segments
-    return TickSettings(bench_for_loop(), preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SETTLE, plan, **kwargs)
+    law = kwargs.pop("law", preset("magnet-beam"))
+    amplitude_law = kwargs.pop("amplitude_law", AmplitudeLaw.VOLTAGE)
+    return TickSettings(bench_for_loop(), law, amplitude_law, kwargs.pop("settle", SETTLE), plan, **kwargs)
 
 
 def latency_samples(plant: VirtualPlant) -> float:
@@ -70,10 +74,22 @@ def latency_samples(plant: VirtualPlant) -> float:
     return HOLD_SAMPLES + plant.filter_delay_s * plant.rate_hz
 
 
+class WatchedPlant(VirtualPlant):
+    """The structure, which keeps the voltages that it was given since it was at rest."""
+
+    def reset(self) -> None:
+        super().reset()
+        self.volts: list[float] = []
+
+    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
+        self.volts += voltages.tolist()
+        return super().step(voltages)
+
+
 class LoopHost:
     """The host of a board, and the structure behind the board, in one."""
 
-    def __init__(self, board: Board, plant: VirtualPlant) -> None:
+    def __init__(self, board: Board, plant: WatchedPlant) -> None:
         self.board, self.plant = board, plant
         self._structure = Firmware(Running(board.child, board.requests, board.answers, "", False), plant)
         self.codec, self.counters = Codec(), dict[str, int]()
@@ -182,13 +198,29 @@ class LoopHost:
         self.until(lambda: bool(self.rows) and self.rows[-1].first + len(self.rows[-1].rows) >= sample)
         return joined(self.rows)
 
+    def counted(self) -> dict[str, str]:
+        """End the board; what it has counted."""
+        self.board.child.send_signal(signal.SIGTERM)
+        while self.board.child.poll() is None:
+            self.pump()
+        return dict(line.split() for line in self.board.ended()[1].splitlines())
+
+    def run_until_off(self) -> tuple[np.ndarray, np.ndarray]:
+        """Readings and rows up to a block at whose end the loop's guard is off."""
+        self.until(lambda: bool(self.rows) and rows_of(self.rows[-1])["guard"][-1] == GuardMode.OFF)
+        return joined(self.rows)
+
+
+def rows_of(block: Rows) -> np.ndarray:
+    """The rows [n] of a block."""
+    return np.ascontiguousarray(block.rows).view(ROW)[:, 0]
+
 
 def joined(blocks: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
     """Readings and rows of blocks, of which none is missing."""
     n = len(blocks[0].rows)
     assert [one.first for one in blocks] == list(range(0, n * len(blocks), n))
-    rows = [np.ascontiguousarray(one.rows).view(ROW)[:, 0] for one in blocks]
-    return np.concatenate([one.readings for one in blocks]), np.concatenate(rows)
+    return np.concatenate([one.readings for one in blocks]), np.concatenate([rows_of(one) for one in blocks])
 
 
 @contextmanager
@@ -197,7 +229,7 @@ def loop_host(
 ) -> Iterator[LoopHost]:
     """A board with the compiled tick, described by the bench, and its host."""
     given = EmulatorSettings(wire=changes.pop("wire", "serial"), bench=bench_for_loop(), lockstep=lockstep, **changes)
-    plant = VirtualPlant(given.bench)
+    plant = WatchedPlant(given.bench)
     arguments = () if log is None else ("--log-output", str(log))
     board = Board(description(given, plant), *arguments, program=built_with_loop(program))
     try:
@@ -211,8 +243,13 @@ def tick_for(settings: TickSettings, plant: VirtualPlant) -> Tick:
     return settings.build(latency_samples(plant))
 
 
-def run_in_python(tick: Tick, plant: VirtualPlant, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Readings and rows of n samples of the loop in this process, with the device's converters between tick and structure."""
+def run_in_python(
+    tick: Tick, plant: VirtualPlant, n: int, at: Mapping[int, Callable[[Tick], None]] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Readings and rows of n samples of the loop in this process, with the device's converters between tick and structure.
+
+    What ``at`` names is done to the tick before it takes the sample of this number.
+    """
     arguments = arguments_for(tick, 1)
     run = bound(tick_block, *arguments)
     v_per_count = plant.v_per_count.astype(np.float32).astype(float)
@@ -224,6 +261,12 @@ def run_in_python(tick: Tick, plant: VirtualPlant, n: int) -> tuple[np.ndarray, 
         inputs, flags = plant.step(counts * plant.output_v_per_count)
         arguments.volts[:] = inputs * v_per_count
         arguments.flags[:] = flags & DeviceFlag.OVERLOAD
+        if at is not None and sample in at:
+            at[sample](tick)
         run(*arguments)
         all_readings[sample], all_rows[sample] = arguments.readings[0], arguments.rows[0]
     return all_readings, all_rows
+
+
+def copy_of(arrays: TickArrays) -> TickArrays:
+    return TickArrays(*(array.copy() for array in arrays))

@@ -190,14 +190,16 @@ static bool has_come(uint64_t time_us)
 static void measure_block(void)
 {
     static int32_t counts[VL_LARGEST_BLOCK];
-    uint32_t n = vl_block();
-    instants_left -= n < instants_left ? n : instants_left;
-    for (uint32_t i = 0; i < n; i++) {
-        counts[i] = vl_output();
-        bench_output(now_us, counts[i]);
+    const uint32_t block = vl_block(), n = vl_ahead();
+    instants_left -= block < instants_left ? block : instants_left;
+    for (uint32_t left = block; left > 0; left -= n) {
+        for (uint32_t i = 0; i < n; i++) {
+            counts[i] = vl_output();
+            bench_output(now_us, counts[i]);
+        }
+        for (uint32_t i = 0; i < n; i++)
+            hand_over_row(instant++, counts[i]);
     }
-    for (uint32_t i = 0; i < n; i++)
-        hand_over_row(instant++, counts[i]);
 }
 
 static bool take_what_is_due(void)
