@@ -1,4 +1,4 @@
-"""A loop that runs on the device itself, as a campaign sees it: rows and state come in blocks, requests go out.
+"""A loop that runs on the device itself: rows and state come in blocks, requests go out.
 
 The device has the same compiled loop as this computer (`rig firmware tick`), gets the records of a run, and then needs nobody
 between one sample and the next: limits and trips act there within a sample.
@@ -6,24 +6,19 @@ between one sample and the next: limits and trips act there within a sample.
 
 import math
 import time
-import warnings
 from collections.abc import Iterator
-from types import TracebackType
-from typing import Literal, Protocol, Self, runtime_checkable
+from contextlib import suppress
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from rig.bench import Bench
-from rig.daq import DAQ, LOST, Image
-from rig.errors import DaqError, DaqMismatch, RigError, as_daq_error
+from rig.daq import DAQ, LOST
+from rig.errors import DaqError, DaqMismatch, as_daq_error
 from rig.loop.driven_loop import end_by_driver
-from rig.loop.loop import LoopStatistics
-from rig.text.json_values import JsonObject
 from rig.tick.layout import DEVICE_SHIFT, ROW, TickArrays
-from rig.tick.tick import Tick, TickSettings
+from rig.tick.tick import Tick
 from rig.wire.messages import Rows, State
 
-ROWS_S = 0.02  # of rows that the device sends at a time; chosen: as a loop by the clock hands over
 WHOLE_STATE_S = 2.0  # after the end, for outcomes that were lost on the way; chosen
 ON_DEVICE = "the loop runs on the device: this computer collects its rows"
 
@@ -79,7 +74,7 @@ class RunsLoops(Protocol):
 
 
 class DeviceLoop:
-    """A loop on a device: its rows, and a copy of its state at the last row.
+    """A loop on a device: its rows one block after the other, and a copy of its state at the last one in ``tick``.
 
     Rows that the wire has lost keep their place: inputs that are not numbers, marked as lost.
     """
@@ -88,80 +83,40 @@ class DeviceLoop:
 
     def __init__(self, daq: DAQ, remote: RemoteLoop, tick: Tick) -> None:
         self.daq, self.tick = daq, tick
-        self.failure, self.cause = None, ""
-        self.statistics = LoopStatistics(daq.sample_rate_hz)
+        self.failure = None
         self.ended = False
         self._remote, self._block = remote, remote.block
         self._bytes = [array.reshape(-1).view(np.uint8) for array in tick.arrays]
         self._last = np.zeros(1, ROW)
         self._wants_ramp = self._wants_release = False
 
-    def run(self) -> Iterator[np.ndarray]:
-        """Telemetry in chunks of about 20 ms, until the output is off."""
-        began = time.perf_counter()
+    def run(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Readings float32[n, n_channels] and rows [n] block by block, until the output is off; then the device is stopped."""
         while not self.ended:
             try:
-                rows = self._next()
+                block = self._next()
                 if self.tick.over:
                     self._finish()
             except Exception as error:
                 self._fail(as_daq_error(error))
                 return
-            self.statistics.samples += rows.size
-            self.statistics.wall_s = time.perf_counter() - began
-            yield rows
+            yield block
 
-    @property
-    def waits(self) -> bool:
-        """False, because the device continues."""
-        return False
-
-    def request_stop(self, cause: str = "") -> None:
+    def request_stop(self) -> None:
         """Request the ramp to 0 V, which is passed on with the next block."""
-        self.cause = self.cause or cause
         self._wants_ramp = True
 
     def release_start(self) -> None:
         """Let the start segment end at its time; passed on with the next block."""
         self._wants_release = True
 
-    def continue_start(self, judgements: int) -> None:
-        """Do nothing: the device goes on by itself."""
+    def stop(self) -> None:
+        """Stop the device at once, with 0 V, if it has not ended."""
+        if not self.ended:
+            self._fail(DaqError("the loop was left before its end"))
 
-    def bring_down(self) -> None:
-        """Ramp to 0 V if the loop still runs, and wait for its end; the rows are dropped."""
-        self.request_stop()
-        for _ in self.run():
-            pass
-
-    @property
-    def lateness_us(self) -> tuple[float, float, float, float]:
-        """NaN: no computer can be late."""
-        return (math.nan,) * 4
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """The driver's counters."""
-        return dict(self.daq.counters)
-
-    @property
-    def images(self) -> tuple[Image, ...]:
-        """Images of the held output in the force reading, as the driver knows them."""
-        return self.daq.images
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Where the loop runs, and the driver's remarks."""
-        return (ON_DEVICE, *self.daq.remarks)
-
-    @property
-    def report(self) -> JsonObject:
-        """Statistics as plain data, for the recording."""
-        told = self.statistics.report(int(self.tick.arrays.loop["cycles"][0]))
-        return {**told, **self.daq.statistics, "real_time": {"pacing": "device", "loop": "device"}}
-
-    def _next(self) -> np.ndarray:
-        """The next rows, with what was requested passed on before."""
+    def _next(self) -> tuple[np.ndarray, np.ndarray]:
+        """The next block, with what was requested passed on before."""
         if self._wants_release:
             self._remote.release()
             self._wants_release = False
@@ -176,10 +131,10 @@ class DeviceLoop:
             return self._lost()
         made = np.ascontiguousarray(rows.rows).view(ROW)[:, 0]
         self._last = made[-1:].copy()
-        return self.tick.joined(rows.readings, made)
+        return rows.readings, made
 
-    def _lost(self) -> np.ndarray:
-        """Rows in place of a block that was lost: the oscillator as it would have gone on, and no readings."""
+    def _lost(self) -> tuple[np.ndarray, np.ndarray]:
+        """A block in place of one that was lost: the oscillator as it would have gone on, and no readings."""
         readings, made = self.tick.buffers(self._block)
         readings.fill(np.nan)
         made[:] = self._last
@@ -189,7 +144,7 @@ class DeviceLoop:
         made["phase_error_rad"] = np.nan
         made["flags"] |= np.uint32(LOST << DEVICE_SHIFT)
         self._last["theta_rad"] = made["theta_rad"][-1]
-        return self.tick.joined(readings, made)
+        return readings, made
 
     def _note(self, state: State) -> None:
         for piece in state.pieces:
@@ -212,51 +167,8 @@ class DeviceLoop:
     def _fail(self, failure: DaqError) -> None:
         self.ended, self.failure = True, failure
         end_by_driver(self.tick, failure)
-        try:
+        with suppress(Exception):  # the device may be gone; its watchdog brings the output to 0 V
             self._remote.stop()
-        except Exception:  # the device may be gone; its watchdog brings the output to 0 V
-            return
-
-
-class DeviceSession:
-    """A bench whose open device runs the loop; as a context manager it ends with the output at 0 V."""
-
-    def __init__(self, daq: DAQ, bench: Bench) -> None:
-        self._daq, self._bench = daq, bench
-        self._loop: DeviceLoop | None = None
-        self.capabilities = daq.capabilities
-        self.identity = {**daq.identity, "loop": "device"}
-        self.latched = daq.latched
-
-    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> None:
-        """Clear what the device had latched; there is no queue. See `rig.loop.session.LocalSession.settle_queue`."""
-        self._daq.clear()
-
-    def start(self, settings: TickSettings) -> DeviceLoop:
-        """Bring the plan to the device and start it there."""
-        daq, bench = self._daq, settings.bench
-        assert isinstance(daq, RunsLoops)
-        tick = Tick(settings, 1.0 + daq.loop_latency_samples)
-        remote = daq.load_loop(tick.arrays, max(1, round(ROWS_S * bench.sample_rate_hz)))
-        remote.begin()
-        self._loop = DeviceLoop(daq, remote, tick)
-        return self._loop
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Ramp down if the loop still runs, and wait for its end."""
-        try:
-            if self._loop is not None and not self._loop.ended:
-                self._loop.bring_down()
-        finally:
-            try:
-                self._daq.close()
-            except RigError as failure:  # dropped, so that the recording is not lost
-                warnings.warn(f"the driver failed when it was closed: {failure}", RuntimeWarning, stacklevel=2)
 
 
 def runs_on_device(daq: RunsLoops) -> bool:

@@ -13,18 +13,19 @@ from rig.bench import Bench
 from rig.bench.cross_checks import refuse
 from rig.daq import DAQ
 from rig.drivers import make_daq
-from rig.errors import RigError
+from rig.errors import ConfigurationError, RigError
 from rig.loop.loop import Loop
-from rig.loop.on_device import DeviceLoop, DeviceSession, RunsLoops, runs_on_device
+from rig.loop.on_device import RunsLoops
 from rig.loop.worker.queue_choice import QueueChoice, settle_queue
 from rig.tick.tick import TickSettings
 
 if TYPE_CHECKING:
     from rig.loop.worker.session import WorkerLoop, WorkerSession
 
-RunningLoop: TypeAlias = "Loop | WorkerLoop | DeviceLoop"
-"""A loop as a campaign sees it; it runs in this process, in another, or on the device."""
+RunningLoop: TypeAlias = "Loop | WorkerLoop"
+"""A loop as a campaign sees it; it runs in this process, or in another or on the device and is collected there."""
 
+NO_COLLECTOR = "this system has no process that collects the rows of a loop on the device"
 NO_PROCESS = "this system has no process for the loop alone: it shares its time with the recorder, nothing is promised"
 
 
@@ -77,20 +78,8 @@ class LocalSession:
             self._loop.bring_down()
 
 
-Session: TypeAlias = "LocalSession | WorkerSession | DeviceSession"
+Session: TypeAlias = "LocalSession | WorkerSession"
 """A bench whose device is open."""
-
-
-@contextmanager
-def _device_session(daq: DAQ, bench: Bench) -> Iterator[DeviceSession | None]:
-    """A session whose loop runs on the device; None if the bench leaves that open and the device has no such loop."""
-    assert isinstance(daq, RunsLoops)
-    with daq:
-        if runs_on_device(daq):
-            with DeviceSession(daq, bench) as session:
-                yield session
-            return
-    yield None
 
 
 @contextmanager
@@ -98,19 +87,15 @@ def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iter
     """Open the bench's driver; when the context ends, whatever happened, set the output to 0 V and close the driver.
 
     A driver whose device has a clock is opened in a separate process, and so is a virtual rig that ``realtime`` slows to the
-    wall clock. A device that runs the loop itself is opened in this one. Raises `ConfigurationError` or `rig.errors.DaqError`.
+    wall clock. Raises `ConfigurationError` or `rig.errors.DaqError`.
     """
     from rig.loop.worker.session import WorkerSession
     from rig.loop.worker.spawn import supported
 
     refuse(bench)
     daq = make_daq(bench, seed)
-    if isinstance(daq, RunsLoops) and daq.loop != "computer":
-        with _device_session(daq, bench) as on_device:
-            if on_device is not None:
-                yield on_device
-                return
-        daq = make_daq(bench, seed)
+    if isinstance(daq, RunsLoops) and daq.loop == "device" and not supported():
+        raise ConfigurationError(NO_COLLECTOR, field="driver.options.loop", value=daq.loop)
     if supported() and (realtime or daq.wall_clock):
         del daq  # not open yet; the other process makes its own driver
         with WorkerSession(bench, seed) as session:

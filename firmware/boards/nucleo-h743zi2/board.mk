@@ -11,5 +11,5 @@ nucleo-h743zi2: $(BUILD)/nucleo-h743zi2.elf ## the device for a NUCLEO-H743ZI2
 
 NUCLEO_SOURCES = $(CORE) $(wildcard $(NUCLEO)/*.c)
 $(BUILD)/nucleo-h743zi2.elf: $(NUCLEO_SOURCES) $(HEADERS) $(NUCLEO)/memory.ld $(NUCLEO)/board.mk | $(BUILD)
-	$(NUCLEO_CC) $(WARNINGS) $(NUCLEO_ARM) -O2 -g $(NUCLEO_LIMITS) -Icore $(NUCLEO_SOURCES) -o $@ -nostartfiles \
+	$(NUCLEO_CC) $(WARNINGS) $(NUCLEO_ARM) -O2 -g $(NUCLEO_LIMITS) $(NUCLEO_FLAGS) -Icore $(NUCLEO_SOURCES) -o $@ -nostartfiles \
 	  --specs=nano.specs --specs=nosys.specs -T $(NUCLEO)/memory.ld -Wl,--gc-sections -lm

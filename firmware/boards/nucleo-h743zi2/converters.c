@@ -14,7 +14,7 @@
 #define TIMER_HZ 48000000u /* 240 MHz / 5: 16 bits reach down to 733 Hz */
 #define LEAST_TICKS 2400u  /* 20 kHz */
 #define MIDDLE 2048        /* of the output converter: 0 V behind the front end */
-#define MIDDLE_IN 32768    /* of the input converters */
+#define MIDDLE_IN 32767    /* of the input converters, whose front end turns the sign */
 #define LAST 65535         /* their ends, which are beyond the range */
 
 enum { TIM6_TRIGGERS_ADC = 13, TIM6_TRIGGERS_DAC = 5, DMAMUX_ADC1 = 9, DMA1_STREAM0_IRQ = 11 };
@@ -162,7 +162,7 @@ void converters_interrupt(void)
     for (unsigned channel = 0; channel < N_CHANNELS; channel++) {
         const uint16_t count = counts_in[channel];
         overload = overload || count == 0 || count == LAST;
-        counts[channel] = (int32_t)count - MIDDLE_IN;
+        counts[channel] = MIDDLE_IN - (int32_t)count;
     }
     tell_missed();
     vl_input(counts, overload);

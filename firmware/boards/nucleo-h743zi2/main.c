@@ -9,14 +9,17 @@
 #ifndef BAUD
 #define BAUD 3000000u
 #endif
-#define RANGE_V 10.0f /* of the front end: +-10 V become 0 to 3.3 V */
+#define FULL_V 10.0f  /* of the front end: +10 to -10 V become 0 to 3.3 V */
+#define RANGE_V 9.4f  /* its amplifiers saturate 0.1 V from their supplies */
+
+#define V_PER_COUNT (2.0f * FULL_V / 65536)
 
 /* Names and order as in the bench file. */
 static const struct vl_channel CHANNELS[N_CHANNELS] = {
-    {.name = "force", .range_v = 0.98f * RANGE_V, .v_per_count = 2.0f * RANGE_V / 65536},
-    {.name = "drive", .range_v = 0.98f * RANGE_V, .v_per_count = 2.0f * RANGE_V / 65536, .skew_ns = PER_CHANNEL_NS},
-    {.name = "acc_drive", .range_v = 0.98f * RANGE_V, .v_per_count = 2.0f * RANGE_V / 65536, .skew_ns = 2 * PER_CHANNEL_NS},
-    {.name = "acc_magnet", .range_v = 0.98f * RANGE_V, .v_per_count = 2.0f * RANGE_V / 65536, .skew_ns = 3 * PER_CHANNEL_NS},
+    {.name = "force", .range_v = RANGE_V, .v_per_count = V_PER_COUNT},
+    {.name = "drive", .range_v = RANGE_V, .v_per_count = V_PER_COUNT, .skew_ns = PER_CHANNEL_NS},
+    {.name = "acc_drive", .range_v = RANGE_V, .v_per_count = V_PER_COUNT, .skew_ns = 2 * PER_CHANNEL_NS},
+    {.name = "acc_magnet", .range_v = RANGE_V, .v_per_count = V_PER_COUNT, .skew_ns = 3 * PER_CHANNEL_NS},
 };
 
 static char serial_number[25];
@@ -29,7 +32,7 @@ static struct vl_description device = {
     .n_channels = N_CHANNELS,
     .channels = CHANNELS,
     .output_range_v = 8.6f, /* the converter's buffer ends 0.2 V from its supplies */
-    .output_v_per_count = 2.0f * RANGE_V / 4096,
+    .output_v_per_count = 2.0f * FULL_V / 4096,
     .bits = 16,
     .shortest_watchdog_us = 5000,
     .longest_watchdog_us = 600 * 1000 * 1000,

@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.campaigns.evaluation.rows import LongRows, Rows, Spool
 from rig.errors import RecordingError
+from rig.recording.parts import missing_rows
 
 IN_MEMORY_BYTES = 32 * 2**20  # bytes of rows in memory; more go to files; chosen
 
@@ -41,7 +42,10 @@ class RowBuffer:
             raise RecordingError(f"the rows of a long record cannot be kept ({error.strerror})", where=where) from error
 
     def take(self, first: int, end: int) -> Rows:
-        """Return the rows of a point, and drop all rows up to the end of the point."""
+        """Return the rows of a point, and drop all rows up to the end of the point.
+
+        Rows that are not there any more, for it was told too late that they belong to the point, are marked as lost.
+        """
         if self._spool is not None:
             begin, stop = self._first, self._first + self._spool.size
             taken = LongRows(self._spool, first - begin, end - begin)
@@ -50,7 +54,7 @@ class RowBuffer:
             if end < stop:
                 self.add(end, rest.whole())
             return taken
-        out = np.empty(end - first, self._dtype)
+        out = missing_rows(end - first, self._dtype)
         while self._chunks and self._chunks[0][0] < end:
             start, rows = self._chunks.popleft()
             self._bytes -= rows.nbytes

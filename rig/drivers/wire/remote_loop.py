@@ -17,6 +17,7 @@ from rig.wire.messages import ARM_KEY, LARGEST_PIECE, Answer, Command, Parameter
 
 UPLOADS = 5  # of an array until the line counts as damaged; chosen
 PINGS_PER_S = 10.0  # chosen: they feed the watchdog
+PING_LOST_S = 1.0  # until an unanswered ping counts as lost; chosen
 ALIGNMENT = 8  # bytes, of the arrays in the device
 REASONS = {
     1: "has another size than it must have",
@@ -84,7 +85,8 @@ class RemoteLoop:
     def take(self) -> tuple[Rows | None, State | None]:
         """The next block of rows, None if it was lost, and the state at its end, None if that was lost."""
         self._blocks += 1
-        if self._blocks % self._blocks_between_pings == 0:
+        overdue = self._ping is None or self._connection.clock() - self._ping[1] > PING_LOST_S
+        if overdue and self._blocks % self._blocks_between_pings == 0:
             request = self._dialogue.next_request(Command.GET, Parameter.PING, self._blocks & 0xFF)
             self._ping = request.number, self._connection.clock()
             self._connection.link.send(request)

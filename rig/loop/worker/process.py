@@ -15,6 +15,8 @@ from rig.bench import Bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, DaqError, RigError
+from rig.loop.on_device import ON_DEVICE, DeviceLoop, RunsLoops, runs_on_device
+from rig.loop.worker.collector import Collector
 from rig.loop.worker.examination import examine_device
 from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import Layout, SharedMemory, packed
@@ -23,7 +25,7 @@ from rig.loop.worker.probe import probe, round_trips
 from rig.loop.worker.queue_choice import DelayBounds, QueueChoice, presumed_latency, queue_of, settle_queue
 from rig.system.privileges import ordinary_scheduling, prepare
 from rig.tick.kernels import tick_block
-from rig.tick.tick import TickSettings
+from rig.tick.tick import Tick, TickSettings
 
 SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
 MEASUREMENTS: dict[str, Callable[..., object]] = {
@@ -73,7 +75,12 @@ def described(error: RigError) -> tuple[tuple[str, ...], str]:
 def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Bench, seed: int, privileged: bool) -> None:
     """Open the driver, and run one loop over it if the campaign says so."""
     with make_daq(bench, seed) as daq:
-        facts.send(("opened", daq.capabilities, dict(daq.identity), daq.latched, daq.remarks, dict(daq.counters)))
+        on_device = isinstance(daq, RunsLoops) and daq.loop != "computer" and runs_on_device(daq)
+        identity = dict(daq.identity) | ({"loop": "device"} if on_device else {})
+        facts.send(("opened", daq.capabilities, identity, daq.latched, daq.remarks, dict(daq.counters)))
+        if on_device:
+            _serve_on_device(daq, bench, commands, facts, descriptor, privileged)
+            return
         _, of_plan = _told(commands)
         choice = _queue_choice(daq, bench, commands, of_plan, privileged)
         facts.send(("queue", choice))
@@ -91,7 +98,8 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         tick = settings.build(daq.latency_samples)
         tick.arrays, state = packed(tick.arrays)
         loop = WallClockLoop(daq, tick, state, memory, facts, lambda: _asked(came, released))
-        facts.send(("started", daq.latency_samples, layout, daq.remarks, daq.images, dict(daq.identity)))
+        delay = bench.block + daq.latency_samples
+        facts.send(("started", delay, layout, daq.remarks, daq.images, dict(daq.identity)))
         try:
             loop.run()
         finally:
@@ -101,6 +109,39 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         statistics = {"deadline_us": round(1e-3 * loop.deadline_ns, 1), "real_time": real_time, **daq.statistics}
     failure = None if loop.failure is None else described(loop.failure)
     facts.send(("ended", failure, loop.cause, loop.counters, statistics))
+
+
+def _serve_on_device(
+    daq: DAQ, bench: Bench, commands: Connection, facts: Connection, descriptor: int, privileged: bool
+) -> None:
+    """Bring the plan to a device that runs the loop, and collect its rows."""
+    assert isinstance(daq, RunsLoops)
+    _told(commands)
+    daq.clear()
+    facts.send(("queue", None))  # there is none
+    _, settings, ring_s = _told(commands)
+    tick = Tick(settings, 1.0 + daq.loop_latency_samples)
+    tick.arrays, state = packed(tick.arrays)
+    layout = Layout.of(bench, tick.arrays, len(daq.counters), ring_s)
+    memory = SharedMemory(descriptor, layout, create=True)
+    _ = tick.over  # loads its kernel
+    came, _ = _listen()
+    lockstep = daq.capabilities.repeatable
+    said = prepare(privileged=privileged and not lockstep)
+    released = _released(commands)
+    remote = daq.load_loop(tick.arrays, layout.chunk)
+    loop = DeviceLoop(daq, remote, tick)
+    collector = Collector(loop, state, memory, facts, lambda: _asked(came, released), lockstep=lockstep)
+    try:
+        remote.begin()
+        identity = dict(daq.identity) | {"loop": "device"}
+        facts.send(("started", 1.0 + daq.loop_latency_samples, layout, (ON_DEVICE, *daq.remarks), daq.images, identity))
+        collector.run()
+    finally:
+        loop.stop()
+    statistics = {"real_time": said | {"pacing": "device", "loop": "device"}, **daq.statistics}
+    failure = None if loop.failure is None else described(loop.failure)
+    facts.send(("ended", failure, collector.cause, dict(daq.counters), statistics))
 
 
 def _queue_choice(

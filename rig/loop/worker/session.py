@@ -20,7 +20,7 @@ from rig.loop.worker.memory import RELEASE_START, START_JUDGED, STOP, TAKEN, TIM
 from rig.loop.worker.queue_choice import QueueChoice
 from rig.loop.worker.spawn import WITHOUT_HOST, Worker, rebuilt
 from rig.text.json_values import JsonObject
-from rig.tick.tick import TickSettings
+from rig.tick.tick import Tick, TickSettings
 
 RING_S = 10.0  # of rows that wait for a late campaign; chosen
 LONGEST_SILENCE_S = 10.0  # until a loop process counts as hanging; chosen
@@ -37,14 +37,14 @@ class WorkerLoop:
         self,
         worker: Worker,
         settings: TickSettings,
-        latency_samples: float,
+        delay_samples: float,
         layout: Layout,
         counters: dict[str, int],
         remarks: tuple[str, ...],
         images: tuple[Image, ...],
     ) -> None:
         bench = settings.bench
-        self.tick = settings.build(latency_samples)
+        self.tick = Tick(settings, delay_samples)
         self.tick.arrays, self._state = packed(self.tick.arrays)
         self.failure = None
         self.cause = ""
@@ -194,8 +194,8 @@ class WorkerSession:
         if not self._settled:
             self.settle_queue()
         self._worker.send("start", settings, self._ring_s)
-        latency_samples, layout, remarks, images, self.identity = self._worker.receive("started")
-        self._loop = WorkerLoop(self._worker, settings, latency_samples, layout, self._counters, remarks, images)
+        delay_samples, layout, remarks, images, self.identity = self._worker.receive("started")
+        self._loop = WorkerLoop(self._worker, settings, delay_samples, layout, self._counters, remarks, images)
         return self._loop
 
     def __enter__(self) -> Self:

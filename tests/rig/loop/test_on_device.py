@@ -1,126 +1,130 @@
-"""A loop on a device: what a campaign sees of it is what it sees of the same loop on the computer."""
+"""A loop on a device: what comes of it is what comes of the same loop on the computer."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import rig.loop.session
 from rig.bench import load_bench
-from rig.campaigns.running.runner import run_plan
+from rig.campaigns.running.runner import tick_settings
+from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqMismatch
+from rig.loop.loop import Loop
 from rig.loop.on_device import DeviceLoop, runs_on_device
-from rig.loop.session import open_session
-from rig.recording.reader import Recording
 from rig.tick.layout import ROW, SAMPLE_LOST
+from rig.tick.tick import Tick
 from rig.wire.messages import ROW_BYTES, Record, State
-from tests.recorded import changed, recorded
+from tests.recorded import changed
 from tests.refused import refused
 from tests.rig.loop.device_in_process import LoopingDAQ
 from tests.rig.loop.worker.rigs import tone
 
-PLAN = changed("magnet-beam/backbone", levels_v=[0.4], record_periods=8)
 BENCH = load_bench("magnet-beam").model_copy(update={"block": 1})
+BLOCK = 100
+TONE = tone(BENCH, 0.4)
 
 
 @pytest.fixture
-def device(monkeypatch):
-    """Let benches have a device that runs the loop; gives its class, to be told what goes wrong."""
-    device = type("Device", (LoopingDAQ,), {})
-    monkeypatch.setattr(rig.loop.session, "make_daq", lambda bench, seed: device(bench, seed))
-    return device
+def device():
+    with LoopingDAQ(BENCH) as daq:
+        yield daq
 
 
-def run(path):
-    run_plan(PLAN, BENCH, path).close()
-    return Recording(path)
+def started(device, settings=TONE):
+    tick = Tick(settings, 1.0 + device.loop_latency_samples)
+    remote = device.load_loop(tick.arrays, BLOCK)
+    remote.begin()
+    return DeviceLoop(device, remote, tick), remote
 
 
-def test_a_run_on_the_device_is_the_run_of_the_computer(device, tmp_path):
-    with Recording(recorded(PLAN, BENCH)) as here, run(tmp_path / "there.h5") as there:
-        n = here.n_rows
-        ours, theirs = here.parts[0].read(0, n), there.parts[0].read(0, there.n_rows)
-        assert theirs[:n].tobytes() == ours.tobytes()
-        assert there.n_rows - n < 0.02 * BENCH.sample_rate_hz  # the last block is whole, at 0 V
-        assert not np.any(theirs["output_v"][n:])
-        assert str(there.points) == str(here.points)
-        assert there.parts[0].information["about"]["device"]["loop"] == "device"
+def run(loop):
+    blocks = [*loop.run()]
+    return loop.tick.joined(np.concatenate([b[0] for b in blocks]), np.concatenate([b[1] for b in blocks]))
 
 
-def loop_of(device, hold_s=0.4, **of_device):
-    for name, value in of_device.items():
-        setattr(device, name, value)
-    return open_session(BENCH), tone(BENCH, hold_s)
+def test_a_run_on_the_device_is_the_run_of_the_computer(device):
+    plan = changed("magnet-beam/backbone", levels_v=[0.4], record_periods=8)
+    settings = tick_settings(plan, BENCH, plan.segments(BENCH.sample_rate_hz, frozenset()), None)
+    settings = replace(settings, start_judged=False)
+    with VirtualDAQ(BENCH) as daq:
+        daq.start(1)
+        here = Loop(daq, settings.build(daq.latency_samples))
+        ours = np.concatenate([*here.run()])
+    loop, _ = started(device, settings)
+    theirs = run(loop)
+    assert theirs[: ours.size].tobytes() == ours.tobytes()
+    assert theirs.size - ours.size < BLOCK  # the last block is whole, at 0 V
+    assert not np.any(theirs["output_v"][ours.size :])
+    for name in ("outcomes", "guard", "progress"):
+        assert getattr(loop.tick.arrays, name).tobytes() == getattr(here.tick.arrays, name).tobytes(), name
+    assert np.any(loop.tick.outcomes["outcome"] == 2)  # the point was measured
 
 
 def test_blocks_that_the_wire_lost_keep_their_place_and_say_so(device):
-    opened, settings = loop_of(device, lost_rows=frozenset({3, 4}))
-    with opened as session:
-        loop = session.start(settings)
-        rows = np.concatenate([*loop.run()])
-    n = loop._block
+    device.lost_rows = frozenset({3, 4})
+    loop, _ = started(device)
+    rows = run(loop)
     lost = (rows["flags"] & SAMPLE_LOST) != 0
-    np.testing.assert_array_equal(np.flatnonzero(lost), np.arange(3 * n, 5 * n))
+    np.testing.assert_array_equal(np.flatnonzero(lost), np.arange(3 * BLOCK, 5 * BLOCK))
     assert np.isnan(rows["inputs"][lost]).all()
     assert np.isfinite(rows["inputs"][~lost]).all()
-    around = rows[: 8 * n]
+    around = rows[: 8 * BLOCK]
     steps = np.diff(np.unwrap(around["theta_rad"].astype(float)))  # the oscillator goes on through the gap
     np.testing.assert_allclose(steps, 2.0 * np.pi * around["frequency_hz"][1:] / BENCH.sample_rate_hz, atol=2e-5)
     assert loop.failure is None
     assert loop.tick.sample == rows.size
 
 
-def test_outcomes_whose_state_was_lost_are_known_at_the_end(device):
-    opened, settings = loop_of(device, lost_states=Lost())
-    with opened as session:
-        loop = session.start(settings)
-        for _ in loop.run():
-            pass
-        np.testing.assert_array_equal(loop.tick.outcomes, session._daq.remote.arrays.outcomes)
-
-
-class Lost:
-    """Every state but one in five."""
+class AllButOneInFive:
+    """Numbers of blocks."""
 
     def __contains__(self, number):
         return number % 5 != 0
 
 
-@pytest.mark.parametrize("how", ["asked", "left"])
-def test_a_stop_is_a_ramp_on_the_device(device, how):
-    opened, settings = loop_of(device, hold_s=2.0)
-    with opened as session:
-        loop = session.start(settings)
-        chunks = loop.run()
-        for _ in range(5):
-            last = next(chunks)
-        if how == "asked":
-            loop.request_stop("enough")
-            last = [*chunks][-1]
-        remote = session._daq.remote
+def test_outcomes_whose_state_was_lost_are_known_at_the_end(device):
+    device.lost_states = AllButOneInFive()
+    loop, remote = started(device)
+    run(loop)
+    np.testing.assert_array_equal(loop.tick.outcomes, remote.arrays.outcomes)
+
+
+def test_a_request_to_stop_is_a_ramp_on_the_device(device):
+    loop, remote = started(device, tone(BENCH, 6.0))
+    blocks = loop.run()
+    for _ in range(5):
+        next(blocks)
+    loop.request_stop()
+    last = [*blocks][-1][1]
     assert [*remote.asked] == ["begin", "ramp", "stop"]
+    assert last["output_v"][-1] == 0.0
     assert loop.tick.over
-    if how == "asked":
-        assert last["output_v"][-1] == 0.0
-        assert loop.cause == "enough"
+    assert loop.tick.sample < 6.0 * BENCH.sample_rate_hz
+
+
+def test_a_loop_that_is_left_stops_the_device(device):
+    loop, remote = started(device)
+    next(loop.run())
+    loop.stop()
+    loop.stop()
+    assert [*remote.asked] == ["begin", "stop"]
+    assert "left" in str(loop.failure)
 
 
 def test_a_silent_device_ends_the_run_and_is_told_to_stop(device):
-    opened, settings = loop_of(device, silent_from=4)
-    with opened as session:
-        loop = session.start(settings)
-        rows = np.concatenate([*loop.run()])
-        assert "silent" in str(loop.failure)
-        assert [*session._daq.remote.asked] == ["begin", "stop"]
-    assert rows.size == 4 * loop._block
+    device.silent_from = 4
+    loop, remote = started(device)
+    assert run(loop).size == 4 * BLOCK
+    assert "silent" in str(loop.failure)
+    assert [*remote.asked] == ["begin", "stop"]
     assert loop.ended
 
 
 def test_pieces_beyond_the_records_are_left_out(device):
-    with open_session(BENCH) as session:
-        loop = session.start(tone(BENCH, 0.1))
-        assert isinstance(loop, DeviceLoop)
-        before = [array.tobytes() for array in loop.tick.arrays]
-        loop._note(State(0, (Record(200, 0, b"1234"), Record(9, 1 << 30, b"1234"), Record(9, 94, b"1234"))))
-        assert [array.tobytes() for array in loop.tick.arrays] == before
+    loop, _ = started(device)
+    before = [array.tobytes() for array in loop.tick.arrays]
+    loop._note(State(0, (Record(200, 0, b"1234"), Record(9, 1 << 30, b"1234"), Record(9, 94, b"1234"))))
+    assert [array.tobytes() for array in loop.tick.arrays] == before
 
 
 @pytest.mark.parametrize(("digest", "named"), [("", "no-loop"), ("f" * 64, "another-loop")])
