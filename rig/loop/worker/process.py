@@ -28,6 +28,8 @@ from rig.tick.kernels import tick_block
 from rig.tick.tick import Tick, TickSettings
 
 SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
+COLLECTED_S = 40.0
+"""Rows of a loop on the device that wait for a late campaign at least, s; chosen: nothing hurries it."""
 MEASUREMENTS: dict[str, Callable[..., object]] = {
     "probe": probe,
     "round trips": round_trips,
@@ -122,7 +124,7 @@ def _serve_on_device(
     _, settings, ring_s = _told(commands)
     tick = Tick(settings, 1.0 + daq.loop_latency_samples)
     tick.arrays, state = packed(tick.arrays)
-    layout = Layout.of(bench, tick.arrays, len(daq.counters), ring_s)
+    layout = Layout.of(bench, tick.arrays, len(daq.counters), max(ring_s, COLLECTED_S))
     memory = SharedMemory(descriptor, layout, create=True)
     _ = tick.over  # loads its kernel
     came, _ = _listen()
