@@ -207,7 +207,7 @@ enum vl_status vl_set(uint8_t parameter, uint8_t item, uint32_t *value)
     if (*value != wanted)
         return VL_NOT_ALLOWED;
     *set = wanted;
-    if (vl_settings.version == VL_LOWEST_VERSION)
-        vl_settings.loop = 0; /* there is none in it */
+    if (parameter == VL_P_VERSION)
+        vl_settings.loop = 0; /* whoever comes next may know of none */
     return VL_DONE;
 }

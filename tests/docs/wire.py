@@ -87,9 +87,15 @@ def packed(name: str, values: dict[str, int | list[list[int]]], bits: int) -> by
         if kind.startswith("counts"):
             flat = [count for row in value for count in (row if isinstance(row, list) else [row])]
             out += struct.pack(f"<{len(flat)}{'h' if bits == 16 else 'i'}", *flat)
+        elif kind.startswith("f32"):
+            out += struct.pack(f"<{sum(map(len, value))}f", *(one for row in value for one in row))
+        elif kind == "bytes":
+            out += bytes.fromhex(value)
+        elif kind == "u8[3]":
+            out += bytes([value] * 3)
         else:
             out += struct.pack("<" + FORMATS[kind], value)
-    return out
+    return out + bytes.fromhex(values.get("rows", ""))  # which stand behind a number of readings
 
 
 def vectors() -> list[dict]:
