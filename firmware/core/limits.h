@@ -8,7 +8,7 @@
 #define VL_MOST_CHANNELS 31
 #endif
 
-/* Samples a block. */
+/* Samples a block; while the loop runs on the device, memory and wire alone bound it. */
 #ifndef VL_LARGEST_BLOCK
 #define VL_LARGEST_BLOCK 1000
 #endif
@@ -34,6 +34,11 @@
 /* Bytes for blocks that are measured and not sent yet; at least two blocks must fit. */
 #ifndef VL_SAMPLE_BYTES
 #define VL_SAMPLE_BYTES (3 * VL_LARGEST_BLOCK * VL_MOST_CHANNELS * VL_MOST_COUNT_BYTES)
+#endif
+
+/* Where the two largest buffers lie, blocks that wait and the frame that is sent: a section, for a chip whose fast memory is small. */
+#ifndef VL_BULK
+#define VL_BULK
 #endif
 
 /* Blocks that are measured and not sent yet, at most. */

@@ -20,7 +20,7 @@ static uint32_t stamp_of(uint64_t index)
 
 void vl_clear_outputs(void)
 {
-    n_slots = (vl_in_force.queue + VL_BLOCKS_AHEAD) * vl_in_force.block;
+    n_slots = vl_has_loop() ? 1 : (vl_in_force.queue + VL_BLOCKS_AHEAD) * vl_in_force.block; /* the loop keeps none */
     for (uint32_t i = 0; i < n_slots; i++)
         atomic_store_explicit(&slots[i].stamp, 0, memory_order_relaxed);
     at = 0;

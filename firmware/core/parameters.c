@@ -13,7 +13,7 @@ uint32_t vl_largest_block(void)
     uint32_t of_state = vl_settings.loop ? VL_STATE_BYTES : 0;
     uint32_t of_the_memory = (VL_SAMPLE_BYTES / 2 - of_state) / vl_sample_bytes(&vl_settings);
     uint32_t largest = of_the_wire < of_the_memory ? of_the_wire : of_the_memory;
-    return largest < VL_LARGEST_BLOCK ? largest : VL_LARGEST_BLOCK;
+    return vl_settings.loop || largest < VL_LARGEST_BLOCK ? largest : VL_LARGEST_BLOCK;
 }
 
 static uint32_t smaller(uint32_t one, uint32_t other)

@@ -16,7 +16,7 @@ static uint8_t seen;             /* flags of the block under way */
 static bool is_spoilt;           /* an instant of the block under way was missed */
 static uint8_t put_out[VL_LARGEST_BLOCK * VL_MOST_COUNT_BYTES]; /* counts of the block under way */
 
-static uint8_t memory[VL_SAMPLE_BYTES];
+static uint8_t memory[VL_SAMPLE_BYTES] VL_BULK;
 static struct vl_samples blocks[VL_MOST_BLOCKS];
 static uint32_t n_blocks, block_bytes;
 static uint32_t readback_bytes;  /* of them, for what was put out: none in version 1, and none with the loop on the device */

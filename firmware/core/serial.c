@@ -18,7 +18,7 @@ enum {
     LONGEST_FRAME = 1 + MOST_SENT + CRC_SIZE + (MOST_SENT + CRC_SIZE) / 254 + 2
 };
 
-static uint8_t line[LONGEST_FRAME];
+static uint8_t line[LONGEST_FRAME] VL_BULK;
 static size_t n_line, n_sent; /* bytes of the frame, and those that the line has taken */
 static size_t code_at;        /* where the length of the present piece goes */
 static bool was_cut;          /* the piece before had 254 bytes, so that the present one may be left out */
