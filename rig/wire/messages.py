@@ -17,7 +17,7 @@ ROW_BYTES = 32
 """Bytes of a telemetry row (`rig.tick.layout.ROW`)."""
 LARGEST_PIECE = 512
 """Bytes of a record in one message."""
-STATE_BYTES = 2048
+STATE_BYTES = 1280
 """Bytes that a device's state takes at most with all that frames it; for the load of a wire."""
 
 HEARTBEATS_HZ = 10

@@ -13,7 +13,7 @@ from joblib.externals.loky import get_reusable_executor
 
 from tests.docs.pages import ROOT
 from tests.docs.reader import Reader
-from tests.firmware.building import built
+from tests.firmware.building import built, built_with_loop
 from tests.sharing import made_once, shared_folder
 
 RECORDINGS = "docs/tutorials/recordings-to-prediction.md"
@@ -44,8 +44,12 @@ TAKES: dict[str, dict[str, tuple[str, ...]]] = {
     },
 }
 
-BUILT = {"docs/how-to/try-the-firmware.md": {"host": Path("firmware/build/host")}}
-"""Targets of the firmware's Makefile that a page builds, and where it finds them."""
+HOST = Path("firmware/build/host")
+BUILT = {
+    "docs/how-to/try-the-firmware.md": (HOST, lambda: built("host")),
+    "docs/how-to/put-the-loop-on-a-board.md": (HOST, lambda: built_with_loop("host")),
+}
+"""Programs of the firmware that a page builds: where it finds them, and what builds them."""
 
 
 def followed(page: str, needs: dict[str, Path]) -> Path:
@@ -62,9 +66,10 @@ def _follow(page: str, needs: dict[str, Path], folder: Path) -> None:
     for source, names in TAKES.get(page, {}).items():
         for name in names:
             copy(followed(source, {}) / name, folder)
-    for target, place in BUILT.get(page, {}).items():
+    if page in BUILT:
+        place, program = BUILT[page]
         (folder / place).parent.mkdir(parents=True)
-        shutil.copy(built(target), folder / place)
+        shutil.copy(program(), folder / place)
     with alone_in(folder):
         Reader(ROOT / page).follow()
 

@@ -48,6 +48,7 @@ NOT_RUN = {
     ("docs/how-to/compare-ways-to-run.md", "takes a minute by the clock"),
     ("docs/how-to/swap-in-a-driver.md", "needs the device"),
     ("docs/how-to/build-a-device.md", "needs the device"),
+    ("docs/how-to/first-hour-with-a-nucleo.md", "needs the board"),
     (
         "docs/how-to/write-a-board.md",
         "take a quarter of an hour to an hour; tests/firmware/test_checks.py and test_differential.py run shorter forms",

@@ -14,7 +14,8 @@ from rig.firmware.build import build_tick
 from tests.sharing import made_once, shared_folder
 
 FOLDER = Path(__file__).parents[2] / "firmware"
-NEEDS = {"mps2-an386": ("make", "arm-none-eabi-gcc", "newlib")}
+ARM = ("make", "arm-none-eabi-gcc", "newlib")
+NEEDS = {"mps2-an386": ARM, "nucleo-h743zi2": ARM}
 """Programs that a target needs; others need those of this computer."""
 HOSTS = ("make", "cc")
 MAKING_S = 900.0
