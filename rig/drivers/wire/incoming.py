@@ -30,6 +30,7 @@ UNARMED = {
     int(DeviceState.RUNNING): "was disarmed by another program",
 }
 REMEMBERED = 4  # blocks that were given up (one of them that comes after all is late, not repeated), and readbacks
+LOOKS = 2  # before the device of a loop counts as silent: the computer may have stood still during the first
 MOST_LOOKED_AT = 64  # messages that are looked through for a block that another has overtaken
 
 
@@ -142,7 +143,7 @@ class Incoming(Generic[Block]):
         return self._untold.pop(message.first, message)
 
     def _wait(self) -> Block:
-        until = 0.0
+        until, looks = 0.0, LOOKS if self._kind is Rows else 1
         left_s, kind = self._timeout_s, self._kind
         while True:
             message = self._next(left_s)
@@ -154,7 +155,11 @@ class Incoming(Generic[Block]):
             now = self._clock()
             until = until or now + self._timeout_s
             left_s = until - now
-            if message is None or left_s <= 0.0:
+            if message is not None and left_s > 0.0:
+                continue
+            looks -= 1
+            until, left_s = 0.0, self._timeout_s
+            if not looks:
                 raise DaqTimeout(
                     f"{self._link.name}: the block at sample {self.expected} has not come within {self._timeout_s:g} s"
                     f"{self._dialogue.damage()}; the device is silent or its cable is damaged"

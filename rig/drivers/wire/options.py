@@ -60,7 +60,7 @@ SHORTEST_BLOCKS = 2  # blocks of the shortest watchdog: one block may be under w
 LONGEST_S, LONGEST_BLOCKS = 1.0, 10  # where something moves: so long an output may be held
 
 
-LOOP_S = 30.0
+LOOP_S = 20.0
 """Default watchdog where the device runs the loop, s; chosen: limits and trips act there, without the computer."""
 LONGEST_LOOP_S = 600.0
 """The longest one where something moves, s; chosen: for so long a vibration may go on that nobody watches."""
