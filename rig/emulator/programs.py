@@ -19,6 +19,8 @@ from rig.errors import ConfigurationError, DaqRefused
 
 ARM_MACHINE = 40  # e_machine of an ELF file
 QEMU = "qemu-system-arm"
+BOARDS = ("mps2-an386", "mps2-an500")
+"""QEMU's boards: an image runs on the one after which it is named, or on the first."""
 STARTING_S = 30.0  # s that a program may take to start; chosen
 POLL_S = 0.02  # s between two looks at a program that starts; chosen
 PORT = re.compile(rb"char device redirected to (/dev/\S+)")
@@ -111,9 +113,10 @@ def _image(path: Path, settings: EmulatorSettings, held: ExitStack) -> Running:
 
 
 def _qemu(image: Path, from_structure: Path, to_structure: Path) -> list[str]:
-    arguments = ",".join(f"arg={one}" for one in ("mps2-an386", from_structure, to_structure))
+    board = image.stem if image.stem in BOARDS else BOARDS[0]
+    arguments = ",".join(f"arg={one}" for one in (board, from_structure, to_structure))
     semihosting = f"enable=on,target=native,{arguments}"
-    machine = [QEMU, "-M", "mps2-an386", "-nographic", "-serial", "pty", "-monitor", "none"]
+    machine = [QEMU, "-M", board, "-nographic", "-serial", "pty", "-monitor", "none"]
     return [*machine, "-semihosting-config", semihosting, "-kernel", str(image)]
 
 

@@ -10,7 +10,9 @@ from typing import NoReturn
 
 import pytest
 
+from rig.errors import ConfigurationError
 from rig.firmware.build import build_tick
+from rig.firmware.targets import target_named
 from tests.sharing import made_once, shared_folder
 
 FOLDER = Path(__file__).parents[2] / "firmware"
@@ -18,6 +20,8 @@ ARM = ("make", "arm-none-eabi-gcc", "newlib")
 NEEDS = {"mps2-an386": ARM, "nucleo-h743zi2": ARM}
 """Programs that a target needs; others need those of this computer."""
 HOSTS = ("make", "cc")
+LOOP_BOARDS = ("mps2-an500", "nucleo-h743zi2")
+"""Targets with a Cortex-M7, which can run the loop."""
 MAKING_S = 900.0
 
 
@@ -40,18 +44,25 @@ def _make(target: str, folder: Path, *variables: str) -> None:
 
 
 def built_with_loop(target: str) -> Path:
-    """The program of a target (``host``, ``host-sanitized``) with the compiled tick linked in, built once.
+    """The program of a target with the compiled tick linked in, built once.
 
-    Skips or fails as `need` does, also where this system's object files are not those of the tick.
+    ``host``, ``host-sanitized`` and ``script`` are for this computer, those of `LOOP_BOARDS` for a Cortex-M7. Skips or fails as
+    `need` does, also where the tick cannot be compiled.
     """
-    need(*HOSTS)
-    if sys.platform != "linux":
+    of_arm = target in LOOP_BOARDS
+    need(*(NEEDS["mps2-an386"] if of_arm else HOSTS))
+    if sys.platform != "linux" and not of_arm:
         do_without("object files of this system are no ELF files")
-    tick = made_once(shared_folder() / "tick-host", lambda folder: build_tick("host", folder) and None)
+    tick_target = "cortex-m7" if of_arm else "host"
+    try:
+        target_named(tick_target).machine()
+    except ConfigurationError as error:
+        do_without(str(error))
+    tick = made_once(shared_folder() / f"tick-{tick_target}", lambda folder: build_tick(tick_target, folder) and None)
     folder = made_once(
         shared_folder() / "firmware" / f"{target}-with-loop", lambda folder: _make(target, folder, f"TICK={tick}")
     )
-    return folder / target
+    return folder / (f"{target}.elf" if of_arm else target)
 
 
 @cache

@@ -17,7 +17,7 @@ from rig.bench import Bench
 from rig.drivers.virtual.driver import HOLD_SAMPLES
 from rig.emulator.firmware import Firmware, description
 from rig.emulator.plant import VirtualPlant
-from rig.emulator.programs import Running
+from rig.emulator.programs import Running, running
 from rig.emulator.settings import EmulatorSettings
 from rig.firmware.signature import arguments_for
 from rig.tick.kernels import tick_block
@@ -43,6 +43,7 @@ from rig.wire.messages import (
 )
 from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame
+from rig.wire.serial.port import PseudoTerminal
 from tests.firmware.building import built_with_loop
 from tests.firmware.test_host_board import Board
 from tests.rig.rigs import SETTLE, bench_with, point_segments
@@ -270,3 +271,25 @@ def run_in_python(
 
 def copy_of(arrays: TickArrays) -> TickArrays:
     return TickArrays(*(array.copy() for array in arrays))
+
+
+class _ImageBoard(Board):
+    """An image that runs in QEMU, as the board of a host."""
+
+    def __init__(self, program: Running, descriptor: int) -> None:
+        self.child, self.requests, self.answers = program.child, program.requests, program.answers
+        self.line = PseudoTerminal(-1, descriptor, program.port)
+
+
+@contextmanager
+def loop_host_of_image(image: Path) -> Iterator[LoopHost]:
+    """An image for ARM with the compiled tick in QEMU, described by the bench, and its host."""
+    given = EmulatorSettings(wire="serial", bench=bench_for_loop(), lockstep=True, firmware=image)
+    plant = WatchedPlant(given.bench)
+    with running(given) as program:
+        descriptor = os.open(program.port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            Firmware(program, plant).begin(description(given, plant))
+            yield LoopHost(_ImageBoard(program, descriptor), plant)
+        finally:
+            os.close(descriptor)

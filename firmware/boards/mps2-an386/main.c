@@ -73,9 +73,12 @@ void board_output(int32_t count)
 
 static void measure_a_block(void)
 {
-    for (uint32_t i = 0; i < vl_block(); i++)
-        plant.outputs[i] = vl_output();
-    is_there = plant_measure(&plant, vl_block());
+    const uint32_t n = vl_ahead();
+    for (uint32_t left = vl_block(); left > 0 && is_there; left -= n) {
+        for (uint32_t i = 0; i < n; i++)
+            plant.outputs[i] = vl_output();
+        is_there = plant_measure(&plant, n);
+    }
 }
 
 /* -- what else the core asks for ----------------------------------------------------------------------------------- */

@@ -4,7 +4,9 @@
 
 #include "board.h"
 
-#define RING 1024u /* bytes, a power of two; the core empties it every millisecond at least */
+#ifndef UART_RING
+#define UART_RING 1024u /* bytes, a power of two; the core empties it every millisecond at least */
+#endif
 
 struct uart {
     uint32_t data, state, control, interrupt_clear, baud_divisor;
@@ -18,7 +20,7 @@ struct uart {
 #define RX_INTERRUPT 2u
 #define SET_ENABLE_INTERRUPTS (*(volatile uint32_t *)0xE000E100u) /* NVIC; receiving by UART 0 is interrupt 0 */
 
-static uint8_t ring[RING];
+static uint8_t ring[UART_RING];
 static volatile uint32_t received, taken;
 
 void uart_begin(void)
@@ -32,8 +34,8 @@ void uart_interrupt(void)
 {
     UART0->interrupt_clear = RX_INTERRUPT;
     uint8_t byte = (uint8_t)UART0->data;
-    if (received - taken < RING) /* else the byte is lost, and by its CRC the frame */
-        ring[received++ % RING] = byte;
+    if (received - taken < UART_RING) /* else the byte is lost, and by its CRC the frame */
+        ring[received++ % UART_RING] = byte;
 }
 
 bool uart_has_received(void)
@@ -45,7 +47,7 @@ size_t board_read(uint8_t *bytes, size_t room)
 {
     size_t n = 0;
     while (n < room && uart_has_received())
-        bytes[n++] = ring[taken++ % RING];
+        bytes[n++] = ring[taken++ % UART_RING];
     return n;
 }
 
