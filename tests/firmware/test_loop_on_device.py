@@ -140,7 +140,7 @@ def test_it_tells_the_digest_of_the_loop_that_is_linked_in_and_its_room():
         words = [host.get(Parameter.TICK_DIGEST, item) for item in range(16)]
         assert as_text(words) == kernels_digest()
         assert host.ask(Command.GET, Parameter.TICK_DIGEST, 16).status == UNKNOWN
-        assert host.get(Parameter.TICK_ROOM) == 256 * 1024
+        assert host.get(Parameter.TICK_ROOM) == 1 << 20
         assert host.get(Parameter.LOOP) == 0
 
 
