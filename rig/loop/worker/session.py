@@ -101,14 +101,16 @@ class WorkerLoop:
 
     @property
     def report(self) -> JsonObject:
-        """Statistics for the record: how late each block began, how long it took, and both together, us."""
+        """Statistics for the record: how late each block began, how long it took, and both together, us.
+
+        A loop on the device has no such times here.
+        """
+        told: JsonObject = {**self.statistics.report(int(self.tick.arrays.loop["cycles"][0])), **self._said}
         histograms = self._memory.histograms
-        return {
-            **self.statistics.report(int(self.tick.arrays.loop["cycles"][0])),
-            **self._said,
-            **{f"{name}_us": histograms[name].report() for name in TIMES},
-            "histograms": {name: histograms[name].bins() for name in TIMES},
-        }
+        if not histograms["execution"].count:
+            return told
+        times = {f"{name}_us": histograms[name].report() for name in TIMES}
+        return {**told, **times, "histograms": {name: histograms[name].bins() for name in TIMES}}
 
     def _wait(self) -> Callable[[], None] | None:
         """Wait for a chunk; if the loop has ended instead, return the function to call after the last chunk."""

@@ -9,6 +9,7 @@ from rig.errors import RecordingError
 from rig.figures.files import plot
 from rig.figures.lateness import exceedance, together
 from rig.recording.reader import Recording
+from rig.show.loop_table import print_loop
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
 from tests.refused import refused
@@ -61,3 +62,13 @@ def test_histograms_of_parts_are_joined_and_their_share_beyond_is_that_of_the_ti
     wanted = [np.mean(times > 1.0), np.mean(times > 2.0)]
     assert exceedance(counts)[:2] == pytest.approx(wanted)
     assert np.isnan(exceedance(counts)[2])
+
+
+def test_a_loop_on_the_device_has_no_times_of_blocks(capsys):
+    said = {"pacing": "device", "loop": "device", "scheduling": "SCHED_FIFO 80"}
+    print_loop({"real_time": said, "overruns": 0, "round_trip_p50_us": 120.0}, {"lost_samples": 300})
+    assert [line.strip() for line in capsys.readouterr().out.splitlines()] == [
+        "the loop ran on the device, its rows were collected; scheduling SCHED_FIFO 80",
+        "300 lost samples",
+        "round trip to the device: p50 120 us",
+    ]
