@@ -1,12 +1,13 @@
 """The buffer thread: it keeps the device's output buffer filled, whether or not the loop hands over outputs in time.
 
-A device that generates without regeneration stops where its buffer runs dry, at whatever voltage it has then. Of this thread
-each block of inputs asks one block of outputs: after inputs n have come it writes outputs ``n + 1 + ahead``, those that the
-loop has handed over, or else what continues the last period (`rig.continuation`), or the last output. The loop has
-``queue - ahead`` blocks of time, the thread ``ahead``.
+A device that generates without regeneration stops where its buffer runs dry, at whatever voltage it has then. What the loop
+has handed over is written as soon as it is there, ``queue`` blocks before it is due: the thread waits for it, but for no
+longer than a part of a block after inputs have come. Then, outputs up to ``n + 1 + ahead`` are written once inputs n have
+come, in place of missing ones what continues the last period (`rig.continuation`), or the last output. So the loop has
+``queue - ahead`` blocks of time; the thread has ``queue`` blocks where the loop is in time, and ``ahead`` where it is not.
 
-A thread without anything to wait for but the device is late where this process is. A loop that has handed over nothing for the
-time of the watchdog is stuck: the thread brings the output to 0 V by a raised cosine and ends.
+A loop that has handed over nothing for the time of the watchdog is stuck: the thread brings the output to 0 V by a raised
+cosine and ends.
 """
 
 import math
@@ -31,6 +32,8 @@ HELD, CONTINUED = 1, 2
 """Bits of the flags of a block's outputs."""
 SWITCH_S = 2e-4
 """Time after which a thread of Python lets another one run, s: 5 ms, as it is by itself, is a block of 64 at 12.8 kHz."""
+PATIENCE = 0.5
+"""Part of a block for which the thread waits for the loop's answer to a block of inputs; chosen: the next one is not there yet."""
 ENDING_S = 2.0
 """Longest wait beyond the ramp for the thread to end, s; chosen."""
 
@@ -41,7 +44,7 @@ class Plan(NamedTuple):
     block: int
     inputs: int
     ahead: int
-    """Blocks that lie ahead in the device's buffer."""
+    """Blocks that lie ahead in the device's buffer where the loop is late."""
     queue: int
     """Blocks between handing over an output and the converter: ``ahead`` and those of the loop."""
     watchdog: int
@@ -94,7 +97,7 @@ class BufferThread:
         begin(self._source[0], plan.longest_period)
         self._size = size
         self._n_handed = self._n_kept = self._n_read = self._n_taken = 0
-        self._written = plan.ahead + 1  # blocks of 0 V that lie in the buffer at the start
+        self._written = plan.queue  # blocks of 0 V that lie in the buffer at the start
         self._zeros = self._written
         self._held_v = 0.0
         self._fade_at = -1
@@ -179,28 +182,39 @@ class BufferThread:
 
     def _is_silent(self) -> bool:
         """Whether everything is 0 V that is or will be put out."""
-        return (self._is_ending or self._tripped) and self._zeros > self._plan.ahead + 1
+        return (self._is_ending or self._tripped) and self._zeros > self._plan.queue + 1
 
     def _exchange(self) -> None:
-        """Read the next block of inputs, and write the next one of outputs."""
-        number = self._n_read
+        """Read the next block of inputs, and write the outputs that have been handed over, or are due."""
+        plan, number = self._plan, self._n_read
+        least = number + 2 + plan.ahead
         self._stream.read(self._inputs[number % self._size])
         with self._changed:
             self._n_read += 1
             self._changed.notify_all()
-            if self._plan.lockstep:
-                due = self._written - self._plan.queue
-                self._changed.wait_for(lambda: self._n_handed > due or self._is_ending)
-        self._write_next()
+        if not plan.lockstep:
+            self._write(least)
+        with self._changed:
+            patience_s = None if plan.lockstep else PATIENCE * plan.block / plan.rate_hz
+            self._changed.wait_for(lambda: self._n_handed > number + 1 or self._is_ending, patience_s)
+        self._write(max(least, self._n_handed + plan.queue))
         if self._feed is not None:
             self._feed()
 
-    def _write_next(self) -> None:
-        plan, number = self._plan, self._written
-        at, first = number % self._size, number * plan.block
-        volts, due = self._put_out[at], number - plan.queue
+    def _write(self, upto: int) -> None:
+        """Write in one call what is missing of so many blocks since the start."""
+        if upto <= self._written:
+            return
         handed = self._n_handed
         self._keep(handed)
+        blocks = [self._next(number, handed) for number in range(self._written, upto)]
+        self._stream.write(blocks[0] if len(blocks) == 1 else np.concatenate(blocks))
+        self._written = upto
+
+    def _next(self, number: int, handed: int) -> Float:
+        """Return block ``number`` of the outputs [n], V, with ``handed`` blocks of the loop."""
+        plan, at, first = self._plan, number % self._size, number * self._plan.block
+        volts, due = self._put_out[at], number - plan.queue
         if due < 0:
             volts[:], raised = 0.0, 0
         elif due < handed:
@@ -210,7 +224,7 @@ class BufferThread:
             raised = CONTINUED
         else:
             volts[:], raised = self._held_v, HELD
-        silent = not plan.lockstep and number - plan.queue - handed >= plan.watchdog / plan.block
+        silent = not plan.lockstep and due - handed >= plan.watchdog / plan.block
         if self._fade_at < 0 and (silent or self._is_ending):
             self._fade_at, self._tripped = first, silent and not self._is_ending
         self._held_v = float(volts[-1])
@@ -218,9 +232,8 @@ class BufferThread:
             done = np.minimum((np.arange(first, first + plan.block) - self._fade_at) / max(1, plan.ramp), 1.0)
             volts *= 0.5 + 0.5 * np.cos(np.pi * done)
         self._raised[at] = raised
-        self._stream.write(volts)
-        self._written += 1
         self._zeros = 0 if volts.any() else self._zeros + 1
+        return volts
 
     def _keep(self, handed: int) -> None:
         """Keep what has been handed over, late or not, for what may have to be continued."""
@@ -236,10 +249,10 @@ class BufferThread:
         """Bring the output to 0 V where inputs no longer come but outputs still go, and wait until it is there."""
         self._is_ending = True
         while not self._is_silent():
-            self._write_next()
+            self._write(self._written + 1)
         plan, waited = self._plan, threading.Event()
         blocks = math.ceil((plan.ramp / plan.block) + plan.queue + 4)
         for _ in range(blocks):
-            if self._stream.generated() >= (self._written - plan.ahead - 1) * plan.block:
+            if self._stream.generated() >= (self._written - plan.queue - 1) * plan.block:
                 return
             waited.wait(plan.block / plan.rate_hz)

@@ -250,7 +250,7 @@ class NiDaqmxDAQ(DAQ):
             tuple(channel.range_v for channel in self.channels),
             self.output_range_v,
             block,
-            self._ahead(block),
+            options.queue + self._ahead(block),
         )
         return Tasks(session, setting, self._timeout_s(block))
 

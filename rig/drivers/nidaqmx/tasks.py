@@ -25,7 +25,7 @@ TERMINALS = {
 INPUT_BUFFER_S = 4.0
 """Time for which the device's buffer takes inputs that are not fetched, s; chosen: far above the longest lateness."""
 SPARE_BLOCKS = 3
-"""Room in the output buffer beyond the blocks that are ahead: one that is written, and two so that no write waits."""
+"""Room in the output buffer beyond the blocks that are ahead, so that no write waits."""
 SAME_RATE = 1e-7
 """Relative difference up to which two rates are the same; chosen: above rounding, below the steps of any device."""
 
@@ -41,7 +41,7 @@ class Setting(NamedTuple):
     block: int
     """Samples of a block."""
     ahead: int
-    """Blocks that lie ahead in the output buffer."""
+    """Blocks that lie ahead in the output buffer: the driver's own, and those of the loop's queue."""
 
 
 class Facts(NamedTuple):
@@ -153,7 +153,7 @@ class Tasks:
         self._out = task = self._session.ni.Task(grpc_options=self._session.options)
         range_v = setting.output_range_v
         self._output = task.ao_channels.add_ao_voltage_chan(options.output, min_val=-range_v, max_val=range_v)
-        size = (setting.ahead + 1 + SPARE_BLOCKS) * setting.block
+        size = (setting.ahead + SPARE_BLOCKS) * setting.block
         if options.shares == "timebase":
             self._clock(task, "", size)
             task.timing.samp_clk_timebase_src = inputs.timing.samp_clk_timebase_term
@@ -166,7 +166,7 @@ class Tasks:
             task.triggers.start_trigger.cfg_dig_edge_start_trig(source)
         self._writer = stream_writers.AnalogSingleChannelWriter(task.out_stream, auto_start=False)
         self._writer.verify_array_shape = False
-        self._writer.write_many_sample(np.zeros((setting.ahead + 1) * setting.block), self._timeout_s)
+        self._writer.write_many_sample(np.zeros(setting.ahead * setting.block), self._timeout_s)
         task.control(constants.TaskMode.TASK_COMMIT)
 
     def _clock(self, task: Any, source: str, size: int) -> None:

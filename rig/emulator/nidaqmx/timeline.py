@@ -18,10 +18,10 @@ LONGEST_STEP = 4096
 """Most samples that the rig is advanced by at once."""
 KEPT = 1 << 17
 """Samples that are kept for reading: more than the largest buffer that NI-DAQmx chooses by itself (100 000)."""
-TICK_S = 0.004
+TICK_S = 0.002
 """Interval at which the clock goes on where nobody calls, s."""
-STALL_S = 0.02
-"""Time for which this process may not be scheduled before its clock stands still, s: five ticks."""
+STALL_S = 0.006
+"""Time for which this process may not be scheduled before its clock stands still, s: three ticks. A device is never late."""
 OPEN_INPUTS = 8
 """Inputs without a sensor behind those of the rig; the first reads the output."""
 HOLD_SAMPLES = 0.5

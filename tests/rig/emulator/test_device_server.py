@@ -130,7 +130,7 @@ def clocked():
 
 def _passes(client, seconds):
     """Let time pass in steps that the server does not take for a pause of its own process."""
-    steps = math.ceil(seconds / 0.01)
+    steps = math.ceil(seconds / 0.005)
     for _ in range(steps):
         client.clock.now_s += seconds / steps
         with client.server.timeline.lock:

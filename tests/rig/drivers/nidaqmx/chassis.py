@@ -15,18 +15,18 @@ PATIENCE_S = 10.0
 
 
 class Chassis:
-    """Inputs are the output times their gain. ``room``: blocks that the output buffer takes."""
+    """Inputs are the output times their gain. ``ahead``: blocks of 0 V in the output buffer at the start."""
 
-    def __init__(self, block, ahead, gains=(1.0, -0.5), room=1000):
+    def __init__(self, block, ahead, gains=(1.0, -0.5)):
         self.block, self.gains = block, np.array(gains)[:, None]
-        self.written = [np.zeros(block)] * (ahead + 1)
-        self.room = room
-        self.measured = 0
+        self.written = [np.zeros(block)] * ahead
+        self.measured = self.awaited = 0
         self.allowed = 0
         self.is_started = False
         self.stopped_at = None
         self.faults = {}
         self.is_over = lambda: False
+        self.lockstep = False
         self._changed = threading.Condition()
 
     # What the buffer thread calls
@@ -37,6 +37,8 @@ class Chassis:
 
     def read(self, inputs):
         with self._changed:
+            self.awaited += 1
+            self._changed.notify_all()
             if not self._changed.wait_for(lambda: self.allowed > self.measured or "read" in self.faults, PATIENCE_S):
                 raise as_ni_error(DaqReadError("no samples", DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, 0), "ai0")
             self._fail("read")
@@ -50,7 +52,7 @@ class Chassis:
             if self.stopped_at is not None:
                 code = DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES
                 raise as_ni_error(DaqWriteError("generation has stopped", code, 0), "ao0")
-            self.written.append(volts.copy())
+            self.written += list(volts.reshape(-1, self.block).copy())
             self._changed.notify_all()
 
     def generated(self):
@@ -59,17 +61,20 @@ class Chassis:
     # What happens on it
 
     def sample(self, blocks=1):
-        """Let the device sample some blocks, and wait until the thread has answered each."""
+        """Let the device sample some blocks, and wait until the thread awaits the next one after each."""
         for _ in range(blocks):
             with self._changed:
                 if self.allowed >= len(self.written):
                     self.stopped_at = self.allowed
                     return
                 self.allowed += 1
-                before = len(self.written)
                 self._changed.notify_all()
-                while not (len(self.written) > before or self.faults or self.is_over()):
+                while not (self._answered() or self.faults or self.is_over()):
                     self._changed.wait(0.01)
+
+    def _answered(self):
+        """Whether the thread has done what it does after the last block of inputs; in lockstep it waits for the loop."""
+        return self.measured >= self.allowed if self.lockstep else self.awaited > self.allowed
 
     def run_dry(self):
         """The device goes on while the thread is not scheduled: its buffer runs dry."""

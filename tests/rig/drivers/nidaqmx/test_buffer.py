@@ -42,9 +42,10 @@ class Loop:
 
     def __init__(self, periodic=True, **changes):
         self.plan = plan(**changes)
-        self.chassis = Chassis(BLOCK, self.plan.ahead)
+        self.chassis = Chassis(BLOCK, self.plan.queue)
         self.thread = BufferThread(self.chassis, self.plan)
         self.chassis.is_over = lambda: self.thread.is_over
+        self.chassis.lockstep = self.plan.lockstep
         self.periodic = periodic
         self.handed = 0
         self.blocks = []
@@ -145,15 +146,24 @@ def test_a_loop_that_is_stuck_is_brought_to_zero_by_its_watchdog_without_a_step(
 def test_in_lockstep_the_device_waits_for_the_loop():
     with Loop(lockstep=True, queue=AHEAD + 1) as loop:
         loop.exchange(10)
-        written = len(loop.chassis.written)
         loop.chassis.allowed += 1  # more could be measured
-        with loop.chassis._changed:
-            loop.chassis._changed.notify_all()
-        loop.take()
-        assert len(loop.chassis.written) == written
+        assert loop.chassis.measured == 10
         loop.hand_over()
+        loop.take()
+        assert loop.chassis.measured == 11
         loop.exchange(5)
         assert not any(block[1] for block in loop.blocks)
+
+
+def test_what_is_handed_over_in_time_lies_in_the_device_for_the_whole_queue():
+    with Loop() as loop:
+        loop.exchange(10)
+        lying = loop.handed + loop.plan.queue
+        assert len(loop.chassis.written) == lying
+        loop.chassis.sample(LOOP - 1)  # the loop is late, but nothing of it is due yet
+        assert len(loop.chassis.written) == lying
+        loop.chassis.sample()
+        assert len(loop.chassis.written) == lying + 1
 
 
 @pytest.mark.parametrize("periodic", [True, False])
