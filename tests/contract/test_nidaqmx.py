@@ -2,14 +2,27 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from nidaqmx.error_codes import DAQmxErrors
+from scipy.signal import butter, lfilter
 
+from rig.bench import Bench
 from rig.conformance import DriverContract
 from rig.daq import DAQ
 from rig.drivers.nidaqmx.driver import NiDaqmxDAQ
+from rig.drivers.virtual import VirtualDAQ
+from rig.emulator.nidaqmx.devices import NI_9234
 from rig.emulator.nidaqmx.faults import Injection
+from rig.emulator.nidaqmx.timeline import HOLD_SAMPLES, converter_of
 from tests.rig.drivers.nidaqmx.test_driver import Served, served
+
+
+def delayed(samples: np.ndarray, by: float) -> np.ndarray:
+    """Samples [n] of a signal without a mean, later by a number of samples that need not be whole: a turn of their spectrum."""
+    n = 2 * samples.size
+    turned = np.fft.rfft(samples, n) * np.exp(-2j * np.pi * np.fft.rfftfreq(n) * by)
+    return np.asarray(np.fft.irfft(turned, n)[: samples.size])
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +46,24 @@ class TestOverADeviceServer(DriverContract):
 
     def make(self) -> DAQ:
         return NiDaqmxDAQ(self.chassis.bench())
+
+    def bench_for_another_process(self) -> Bench:
+        return self.chassis.bench()
+
+    def known_inputs(self, outputs: np.ndarray, block: int) -> np.ndarray:
+        """What the rig without any device reads, later by the filters of an NI 9234, the sensors through its AC coupling."""
+        virtual, rate_hz = self.chassis.virtual, self.chassis.bench().sample_rate_hz
+        options = virtual.driver.options | {"converter": converter_of(NI_9234, virtual.output_range_v, rate_hz)}
+        driver = virtual.driver.model_copy(update={"options": options})
+        outputs = outputs[: outputs.size // block * block]
+        with VirtualDAQ(virtual.model_copy(update={"sample_rate_hz": rate_hz, "driver": driver})) as daq:
+            daq.start(block)
+            read = np.vstack([daq.exchange(part.copy()) for part in outputs.reshape(-1, block)])
+            late = NI_9234.delay_samples + NI_9234.delay_s * rate_hz
+            sensors = late - daq.filter_delay_samples
+        passed = lfilter(*butter(1, NI_9234.high_pass_hz, "highpass", fs=rate_hz), read[:, :-1], axis=0)
+        columns = [delayed(column, sensors) for column in passed.T]
+        return np.column_stack([*columns, delayed(outputs, late + HOLD_SAMPLES)])
 
     def witness(self, daq: DAQ | None) -> float | None:
         return abs(self.chassis.output_v)

@@ -33,7 +33,9 @@ HELD, CONTINUED = 1, 2
 SWITCH_S = 2e-4
 """Time after which a thread of Python lets another one run, s: 5 ms, as it is by itself, is a block of 64 at 12.8 kHz."""
 PATIENCE = 0.5
-"""Part of a block for which the thread waits for the loop's answer to a block of inputs; chosen: the next one is not there yet."""
+"""Part of a block for which the thread waits for the loop's answer to a block of inputs; chosen: the next comes after that."""
+WAITS = 4
+"""Parts in which a block is waited for: a process that was stopped has used up one of them, not the whole time."""
 ENDING_S = 2.0
 """Longest wait beyond the ramp for the thread to end, s; chosen."""
 
@@ -126,11 +128,14 @@ class BufferThread:
         plan, number = self._plan, self._n_taken
         patience_s = 2.0 * plan.timeout_s + plan.block / plan.rate_hz
         with self._changed:
-            came = self._changed.wait_for(lambda: self._n_read > number or self._failure is not None, patience_s)
+            for _ in range(WAITS):
+                if self._changed.wait_for(
+                    lambda: self._n_read > number or self._failure is not None, patience_s / WAITS
+                ):
+                    break
         if self._n_read <= number:
             if self._failure is not None:
                 raise self._failure
-            assert not came
             raise DaqTimeout(f"the device has not answered for {patience_s:g} s (driver.options.timeout_s)")
         self._n_taken += 1
         at = number % self._size

@@ -26,7 +26,8 @@ HOST = "127.0.0.1"
 """Address that it listens on."""
 THREADS = 4
 """Threads that answer calls: one that waits for samples, one that writes them, and two to spare."""
-
+IDLE_S = 0.02
+"""Interval at which watchdogs are looked after where nothing is sampled, s."""
 SWITCH_S = 2e-4
 """Time after which a thread of Python lets another one run, s: 5 ms, as it is by itself, last as long as a block."""
 
@@ -69,7 +70,7 @@ class DeviceServer:
         return {**self.calls.counts, "stalls": self.timeline.stood_still}
 
     def _tick(self) -> None:
-        while not self._ends.wait(TICK_S):
+        while not self._ends.wait(TICK_S if self.timeline.on else IDLE_S):
             with self.timeline.lock:
                 self.timeline.tick()
                 self.tasks.watchdogs.expire()

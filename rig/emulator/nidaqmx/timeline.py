@@ -23,7 +23,9 @@ TICK_S = 0.002
 STALL_S = 0.006
 """Time for which this process may not be scheduled before its clock stands still, s: three ticks. A device is never late."""
 OPEN_INPUTS = 8
-"""Inputs without a sensor behind those of the rig; the first reads the output."""
+"""Inputs without a sensor behind those of the rig; the first of them reads the output, and so does the `LAST` one."""
+LAST = 7
+"""Number of the last input of the chassis, where `rig new bench` expects the loopback cable."""
 HOLD_SAMPLES = 0.5
 """A held output is half a sample late on average."""
 ANTI_ALIAS = 0.4
@@ -98,10 +100,12 @@ class Timeline:
         self._plant.reset()
         delay = inputs.delay_samples + inputs.delay_s * rate_hz
         n, plant_delay = len(self._plant.names), self._plant.filter_delay_s * rate_hz
-        delays = np.append(np.full(n, max(0.0, delay - plant_delay)), delay + HOLD_SAMPLES)
+        self._read_by = [*range(n), *sorted({n, max(n, LAST)})]
+        cables = len(self._read_by) - n
+        delays = np.repeat((max(0.0, delay - plant_delay), delay + HOLD_SAMPLES), (n, cables))
         passed = high_pass(inputs.high_pass_hz, rate_hz), (0.0, 0.0)
-        self._filters = Filters(delays, [passed[column not in ac_coupled] for column in range(n + 1)])
-        self._filters(np.zeros((2, n + 1)), 1.0)  # compiles
+        self._filters = Filters(delays, [passed[column not in ac_coupled] for column in self._read_by])
+        self._filters(np.zeros((2, delays.size)), 1.0)  # compiles
         self._plant.log = self.log
 
     def begin(self) -> None:
@@ -174,12 +178,13 @@ class Timeline:
     def _read(self, volts: Float) -> None:
         counts, _ = self._plant.step(volts)
         assert self._inputs is not None
-        raw = np.column_stack((counts * self._plant.v_per_count, volts))
+        cables = len(self._read_by) - counts.shape[1]
+        raw = np.column_stack((counts * self._plant.v_per_count, *(volts for _ in range(cables))))
         rows = self._filters(raw, self._inputs.ranges_v[-1])
         first, n = self.done % KEPT, volts.size
         head = min(n, KEPT - first)
-        self._kept[first : first + head, : rows.shape[1]] = rows[:head]
-        self._kept[: n - head, : rows.shape[1]] = rows[head:]
+        self._kept[first : first + head, self._read_by] = rows[:head]
+        self._kept[: n - head, self._read_by] = rows[head:]
 
     def readings(self, first: int, n: int, columns: list[int]) -> Float:
         """Readings of samples from ``first`` on, by channel [columns, n], V."""
