@@ -1,5 +1,7 @@
 """A bench to begin with for a device that is connected to this computer."""
 
+import re
+
 from rig.bench import Bench
 from rig.bench.configuration import Table, validated
 from rig.drivers import make_daq
@@ -10,6 +12,8 @@ from rig.errors import ConfigurationError, DaqError
 
 ON_A_WIRE = ("serial", "can")
 """Drivers whose devices say what they have."""
+SERVER = r"[^\s:/]+:[0-9]{1,5}"
+"""Pattern of the address of an NI gRPC Device Server."""
 DECIMATION = 4
 """Frames of a sound device in a sample of its bench; chosen: 12 kHz of 48 kHz."""
 BLOCK_FRAMES = 128
@@ -25,7 +29,11 @@ def device_named(text: str) -> Attached:
     Raises `ConfigurationError` where there is none, or several, with the names of those there are.
     """
     driver, _, name = text.partition(":")
-    name, _, server = name.partition("@") if driver == "nidaqmx" else (name, "", "")
+    name, at, server = name.partition("@") if driver == "nidaqmx" else (name, "", "")
+    if at and not re.fullmatch(SERVER, server):
+        raise ConfigurationError(
+            field="source", value=text, allowed="nidaqmx:NAME@HOST:PORT; a server's usual port is 31763"
+        )
     found = Found(ni_devices(server), []) if server else attached_devices()
     devices = [f"{one.driver}:{one.name}" for one in found.devices]
     matching = [one for one in found.devices if one.driver == driver and name.casefold() in one.name.casefold()]

@@ -219,7 +219,8 @@ class BufferThread:
     def _next(self, number: int, handed: int) -> Float:
         """Return block ``number`` of the outputs [n], V, with ``handed`` blocks of the loop."""
         plan, at, first = self._plan, number % self._size, number * self._plan.block
-        volts, due = self._put_out[at], number - plan.queue
+        volts: Float = self._put_out[at]
+        due = number - plan.queue
         if due < 0:
             volts[:], raised = 0.0, 0
         elif due < handed:

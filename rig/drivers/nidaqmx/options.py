@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from rig.drivers.wire.options import WireOptions
+from vibrolock.described import one_fault
 
 Coupling = Literal["", "AC", "DC"]
 """Coupling of an input; empty: as the device has it by default."""
@@ -14,7 +15,7 @@ Milliamperes = Annotated[float, Field(ge=0, le=20)]
 """Current of an IEPE sensor, mA."""
 PHYSICAL = r"^[^/,:]+/[a-z]+[0-9]+$"
 """Pattern of the name of a physical channel: device and channel."""
-Physical = Annotated[str, Field(pattern=PHYSICAL)]
+Physical = Annotated[Annotated[str, Field(pattern=PHYSICAL)], one_fault("device/channel, such as cDAQ1Mod1/ai0")]
 """Name of a physical channel, such as ``cDAQ1Mod1/ai0``."""
 
 

@@ -251,6 +251,16 @@ def test_samples_are_in_order_and_by_channel(client):
     assert straight[0] == pytest.approx((100 - DELAY - HOLD) / 1000.0, abs=1e-4)
 
 
+def test_the_loopback_cable_is_at_the_first_free_input_and_at_the_last(client):
+    ai, ao = client.inputs(LOOPBACK, "cDAQ1Mod2/ai3"), client.output(2)
+    ao.start()
+    ai.start()
+    write(ao, np.arange(4 * BLOCK) / 1000.0)
+    came = read(ai, 6 * BLOCK, 2)
+    assert came.any()
+    np.testing.assert_array_equal(came[0], came[1])
+
+
 def test_lockstep_gives_only_as_many_inputs_as_outputs_were_written(client):
     ai, ao = client.inputs(INPUT), client.output(2)
     ao.start()

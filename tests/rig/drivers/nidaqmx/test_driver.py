@@ -15,7 +15,7 @@ from rig.emulator.nidaqmx.faults import Injection
 from rig.emulator.nidaqmx.reaching import chassis_options, reaching_bench
 from rig.emulator.nidaqmx.server import DeviceServer
 from rig.emulator.settings import EmulatorSettings
-from rig.errors import DaqBusy, DaqDisconnected, DaqError, DaqMismatch, DaqRefused
+from rig.errors import ConfigurationError, DaqBusy, DaqDisconnected, DaqError, DaqMismatch, DaqRefused
 from rig.loop.worker.queue_choice import HOLD_SAMPLES, presumed_latency
 from tests.refused import refused
 from tests.rig.rigs import bench_with
@@ -111,6 +111,19 @@ def test_a_range_that_the_module_does_not_have_is_refused(chassis):
         pass
     with refused(DaqMismatch, "up-to-10-v", field="output_range_v"), make_daq(chassis.bench({"output_range_v": 12.0})):
         pass
+
+
+def test_a_channel_without_its_device_is_told_how_it_is_written(chassis):
+    bench = chassis.bench(inputs=["ai0", *chassis.bench().driver.options["inputs"][1:]])
+    with refused(ConfigurationError, field="inputs[0]", value="ai0", allowed=bool):
+        make_daq(bench)
+
+
+@pytest.mark.parametrize("address", ["", "host", "host:1:2"])
+def test_a_device_server_is_named_with_its_port(command, address):
+    said = command("new", "bench", "--from", f"nidaqmx:cDAQ1@{address}", "-o", "other.toml")
+    assert said.status == 1
+    assert "HOST:PORT" in said.err
 
 
 @pytest.mark.parametrize(
