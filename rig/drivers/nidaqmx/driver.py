@@ -90,8 +90,11 @@ class NiDaqmxDAQ(DAQ):
         return (self._options.queue + self._ahead(block)) * block
 
     def _ahead(self, block: int) -> int:
-        """Blocks that lie ahead in the device's buffer."""
-        return self._options.buffer_blocks or max(BUFFER_BLOCKS, math.ceil(BUFFER_S * self.sample_rate_hz / block))
+        """Blocks that lie ahead in the device's buffer: in blocks of another size as much time as in those of the bench."""
+        given = self._options.buffer_blocks
+        if given:
+            return max(BUFFER_BLOCKS, math.ceil(given * self._bench.block / block))
+        return max(BUFFER_BLOCKS, math.ceil(BUFFER_S * self.sample_rate_hz / block))
 
     @property
     def identity(self) -> dict[str, str]:

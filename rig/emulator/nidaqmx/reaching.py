@@ -35,10 +35,12 @@ def chassis_options(bench: Bench, port: int, *, lockstep: bool) -> "Table":
 def reaching_bench(bench: Bench, options: "Table") -> Bench:
     """Return the bench that reaches the chassis of a virtual bench: at a rate of its inputs, with blocks of 5 ms.
 
-    Channels that read the output come last, as the next input of the chassis does.
+    Channels that read the output come last, as the next input of the chassis does; the others are AC coupled.
     """
     rate_hz = coerced_hz([NI_9234], max(bench.sample_rate_hz, LOWEST_HZ))
+    coupled = {"input_high_pass_hz": NI_9234.high_pass_hz}
     changes = {
+        "channels": tuple(one if one.loopback else one.model_copy(update=coupled) for one in bench.channels),
         "driver": DriverChoice(name="nidaqmx", options=options),
         "sample_rate_hz": rate_hz,
         "block": BLOCK,
