@@ -51,7 +51,10 @@ $(COVERAGE)/replay-%: $(FUZZ) checks/replay.c $(HEADERS)
 	mkdir -p $(COVERAGE)
 	$(GCOV) -DFUZZ_WIRE=$* $(FUZZ_LIMITS) $(FUZZ) checks/replay.c -o $@
 
-CPPCHECK = cppcheck --error-exitcode=1 --std=c11 --quiet --force -Icore -Iboards/plant
+# With TICK=DIR, which is a folder that `rig firmware tick --target host` has filled, the core with the loop. Without, some conditions
+# are always true.
+CPPCHECK = cppcheck --error-exitcode=1 --std=c11 --quiet --force -Icore -Iboards/plant $(if $(TICK),-DVL_HAS_TICK -I$(TICK),-UVL_HAS_TICK) \
+    --suppress=knownConditionTrueFalse:core/device.c --suppress=knownConditionTrueFalse:core/sampling.c
 
 .PHONY: cppcheck
 cppcheck: ## static analysis; members of structures that are registers are never "used", so without style there

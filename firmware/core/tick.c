@@ -30,7 +30,7 @@ static const uint32_t RECORD[VL_TICK_ARRAYS] = {TICK_ARRAYS(BYTES_OF)};
 
 static _Alignas(8) uint8_t pool[VL_TICK_BYTES];
 static uint32_t begin[VL_TICK_ARRAYS], size[VL_TICK_ARRAYS]; /* bytes */
-static uint32_t fault;   /* of the last START */
+static uint32_t last_fault; /* of the last START */
 static bool is_used;     /* the records are not those of a fresh run any more */
 
 static struct tick_arrays t;
@@ -52,7 +52,7 @@ static void forget_from(uint32_t place)
 void vl_begin_tick(void)
 {
     forget_from(0);
-    fault = 0;
+    last_fault = 0;
     is_used = false;
 }
 
@@ -75,7 +75,7 @@ bool vl_tick_get(uint8_t parameter, uint8_t item, uint32_t *value)
     else if (parameter == VL_P_TICK_PERIOD && item == 0)
         *value = vl_settings.tick_period;
     else if (parameter == VL_P_TICK_FAULT && item == 0)
-        *value = fault;
+        *value = last_fault;
     else if (parameter == VL_P_TICK_BYTES && item < VL_TICK_ARRAYS)
         *value = size[item];
     else if (parameter == VL_P_TICK_CRC && item < VL_TICK_ARRAYS)
@@ -139,8 +139,8 @@ static uint32_t look_for_a_fault(void)
 
 bool vl_tick_is_ready(uint32_t *why_not)
 {
-    *why_not = fault = look_for_a_fault();
-    return fault == 0;
+    *why_not = last_fault = look_for_a_fault();
+    return last_fault == 0;
 }
 
 void vl_restart_tick(void)
@@ -204,6 +204,12 @@ static uint8_t *put_refused(uint8_t *into, uint32_t number)
     return put_piece(into, VL_A_progress, offsetof(struct tick_progress, refused) + number % entries * entry, entry);
 }
 
+static uint32_t next_of(uint32_t *turn, uint32_t n)
+{
+    *turn = *turn + 1 < n ? *turn + 1 : 0;
+    return *turn;
+}
+
 uint32_t vl_tick_state(uint8_t *into)
 {
     uint8_t *const first = into;
@@ -215,15 +221,13 @@ uint32_t vl_tick_state(uint8_t *into)
     into = put_piece(into, VL_A_progress, 0, offsetof(struct tick_progress, refused));
     into = put_piece(into, VL_A_control, offsetof(struct tick_control, vibration), sizeof t.control->vibration);
     into = put_piece(into, VL_A_control, offsetof(struct tick_control, frequency), sizeof t.control->frequency);
-    in_turn = in_turn < present ? in_turn + 1 : 0;
-    into = put_outcome(into, in_turn);
+    into = put_outcome(into, next_of(&in_turn, present + 1));
     if (present > 0)
         into = put_outcome(into, present - 1);
     into = put_outcome(into, present);
     if (refused > 0) {
         const uint32_t kept = refused < 64 ? refused : 64;
-        refused_in_turn = refused_in_turn + 1 < kept ? refused_in_turn + 1 : 0;
-        into = put_refused(into, refused - 1 - refused_in_turn);
+        into = put_refused(into, refused - 1 - next_of(&refused_in_turn, kept));
         into = put_refused(into, refused - 1);
     }
     return (uint32_t)(into - first);

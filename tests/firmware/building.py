@@ -43,6 +43,17 @@ def _make(target: str, folder: Path, *variables: str) -> None:
     assert done.returncode == 0, f"make {target}:\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
 
 
+def built_tick(target: str) -> Path:
+    """The folder with the compiled tick for a target of `rig firmware tick`, made once; skips or fails as `need` does."""
+    if sys.platform != "linux" and target == "host":
+        do_without("object files of this system are no ELF files")
+    try:
+        target_named(target).machine()
+    except ConfigurationError as error:
+        do_without(str(error))
+    return made_once(shared_folder() / f"tick-{target}", lambda folder: build_tick(target, folder) and None)
+
+
 def built_with_loop(target: str) -> Path:
     """The program of a target with the compiled tick linked in, built once.
 
@@ -51,14 +62,7 @@ def built_with_loop(target: str) -> Path:
     """
     of_arm = target in LOOP_BOARDS
     need(*(NEEDS["mps2-an386"] if of_arm else HOSTS))
-    if sys.platform != "linux" and not of_arm:
-        do_without("object files of this system are no ELF files")
-    tick_target = "cortex-m7" if of_arm else "host"
-    try:
-        target_named(tick_target).machine()
-    except ConfigurationError as error:
-        do_without(str(error))
-    tick = made_once(shared_folder() / f"tick-{tick_target}", lambda folder: build_tick(tick_target, folder) and None)
+    tick = built_tick("cortex-m7" if of_arm else "host")
     folder = made_once(
         shared_folder() / "firmware" / f"{target}-with-loop", lambda folder: _make(target, folder, f"TICK={tick}")
     )
