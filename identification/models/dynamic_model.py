@@ -14,7 +14,7 @@ from identification.experiments.simulation import Simulation
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import HarmonicResponse, SteadyStates
 from identification.linear.modes import LinearModes
-from identification.prediction.steady_prediction import SteadyPrediction
+from identification.prediction.steady_prediction import ResponseBand, SteadyPrediction
 from vibrolock.arrays import Complex, Float
 from vibrolock.on_use import Registry
 
@@ -118,6 +118,16 @@ class DynamicModel(ABC):
     def draws(self, count: int, seed: int) -> Iterator["DynamicModel"]:
         """Yield models drawn about this one by the covariance of its identification."""
         raise self.cannot("be drawn", "its identification gives no covariance")
+
+    def with_what_is_open(
+        self, band: ResponseBand, response: SteadyPrediction, respond: Callable[[object], SteadyPrediction]
+    ) -> ResponseBand:
+        """Return a band of `draws` with what the data leave open beyond their range.
+
+        ``response`` is that of this model, ``respond`` gives the same of another one, however far it goes. Raises
+        `IdentificationError` if what is open makes the response uncertain. A kind that knows nothing of it returns the band.
+        """
+        return band
 
     def cannot(self, what: str, hint: str) -> IdentificationError:
         """Return the error for something that the kind does not answer."""

@@ -18,6 +18,9 @@ from identification.renamed import formerly
 _COMMON = {"force", "harmonics", "points", "largest_range_use"}
 """Options that every kind of model has."""
 
+_ANY_RANGE = 1e3
+"""Largest use of the range of responses that are followed however far they go."""
+
 Band = tuple[float | None, float | None]
 
 
@@ -137,7 +140,11 @@ def response_band(
 ) -> ResponseBand:
     """Propagate the errors of a model to a predicted response, by Monte Carlo.
 
-    Raises `IdentificationError` if the model has no standard errors, or ``draws`` is below 20.
+    The band of a structured model also holds the error that its fit left, and laws that the training data leave open beyond
+    their range (`identification.models.structured.alternatives`).
+
+    Raises `IdentificationError` if the model has no standard errors, or ``draws`` is below 20, and `ExtrapolationError` if
+    these laws differ too much or the force of a structured model is above twice that of its training data.
 
     Parameters
     ----------
@@ -152,12 +159,14 @@ def response_band(
     """
     IdentificationError.unless_at_least("draws", draws, 20)
     found = dynamic_model(model)
-    return band_of_responses(
-        frequency_response(
-            one, force_n, force=force, exciter=exciter, points=found.band_points, largest_range_use=largest_range_use
+
+    def respond(one: object, largest: float = _ANY_RANGE) -> SteadyPrediction:
+        return frequency_response(
+            one, force_n, force=force, exciter=exciter, points=found.band_points, largest_range_use=largest
         )
-        for one in found.draws(draws, seed)
-    )
+
+    band = band_of_responses(respond(one, largest_range_use) for one in found.draws(draws, seed))
+    return found.with_what_is_open(band, respond(model, largest_range_use), respond)
 
 
 def harmonic_response(

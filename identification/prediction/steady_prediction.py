@@ -1,7 +1,7 @@
 """A predicted frequency response at constant force, the peak of a sampled curve, and the band of several predictions."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +151,7 @@ _POINTS = 121
 """Phase lags of a band, from 10 to 170 degrees. Chosen."""
 _INTERVAL = (2.5, 97.5)
 """Percentiles of a band, which holds 95 %."""
+_TWO_SIDED_95 = 1.96
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -180,20 +181,70 @@ class ResponseBand(Result):
 def band_of_responses(responses: Iterable[SteadyPrediction]) -> ResponseBand:
     """Return the band of several predictions of the same response, two at least, by their branches that begin at rest."""
     lags = np.linspace(10.0, 170.0, _POINTS)
-    amplitude, frequency, peaks = [], [], []
+    curves, peaks = [], []
     for found in responses:
-        main = found.branch == 0
-        lag = found.phase_lag_deg()[main]
-        amplitude.append(np.interp(lags, lag, found.amplitude_m()[main]))
-        frequency.append(np.interp(lags, lag, found.frequency_hz[main]))
+        curves.append(_over_lags(found, lags))
         peak = found.peak()
         peaks.append((peak.amplitude_m, peak.frequency_hz))
     spread = np.std(peaks, axis=0, ddof=1)
+    amplitude, frequency = np.percentile(curves, _INTERVAL, axis=0).swapaxes(0, 1)
     return ResponseBand(
         phase_lag_deg=lags,
-        amplitude_m=np.percentile(amplitude, _INTERVAL, axis=0),
-        frequency_hz=np.percentile(frequency, _INTERVAL, axis=0),
+        amplitude_m=amplitude,
+        frequency_hz=frequency,
         peak_amplitude_std_m=float(spread[0]),
         peak_frequency_std_hz=float(spread[1]),
         draws=len(peaks),
     )
+
+
+def widened(
+    band: ResponseBand,
+    response: SteadyPrediction,
+    families: Sequence[Sequence[SteadyPrediction]],
+    amplitude_error: float,
+    frequency_error: float,
+) -> ResponseBand:
+    """Return a band that also holds other responses and an error.
+
+    The ends of the band move by how far the responses of each family differ from ``response`` that way, all families
+    together. The standard errors become those of a symmetric 95 % interval that holds all of it.
+
+    Parameters
+    ----------
+    band
+        The band.
+    response
+        Response that it is of.
+    families
+        Other responses that are possible, by what makes them differ.
+    amplitude_error, frequency_error
+        Further errors relative to amplitude and frequency.
+    """
+    own, peak = _over_lags(response, band.phase_lag_deg), response.peak()
+    ends = np.array([band.amplitude_m, band.frequency_hz])
+    own_peak = np.array([peak.amplitude_m, peak.frequency_hz])
+    half = _TWO_SIDED_95 * np.array([band.peak_amplitude_std_m, band.peak_frequency_std_hz])
+    for family in families:
+        moved = np.array([_over_lags(one, band.phase_lag_deg) for one in family]) - own
+        ends[:, 0] += np.minimum(np.min(moved, axis=0), 0.0)
+        ends[:, 1] += np.maximum(np.max(moved, axis=0), 0.0)
+        peaks = np.array([(one.peak().amplitude_m, one.peak().frequency_hz) for one in family])
+        half += np.max(np.abs(peaks - own_peak), axis=0)
+    errors = np.array([amplitude_error, frequency_error])
+    more = errors[:, None] * own
+    half += errors * own_peak
+    return replace(
+        band,
+        amplitude_m=np.array([np.maximum(ends[0, 0] - more[0], 0.0), ends[0, 1] + more[0]]),
+        frequency_hz=np.array([np.maximum(ends[1, 0] - more[1], 0.0), ends[1, 1] + more[1]]),
+        peak_amplitude_std_m=float(half[0] / _TWO_SIDED_95),
+        peak_frequency_std_hz=float(half[1] / _TWO_SIDED_95),
+    )
+
+
+def _over_lags(response: SteadyPrediction, lags: Float) -> Float:
+    """float[2, n]: amplitude and frequency of the branch that begins at rest, at phase lags."""
+    main = response.branch == 0
+    lag = response.phase_lag_deg()[main]
+    return np.array([np.interp(lags, lag, row[main]) for row in (response.amplitude_m(), response.frequency_hz)])

@@ -1,6 +1,6 @@
 """Answers of a structured model to what is asked of any dynamic model."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,10 @@ from identification.models.balanced_model import BalancedModel
 from identification.models.dynamic_model import Limit, SteadyRequest
 from identification.models.structured.balance import StructuredBalance
 from identification.models.structured.coupled import coupled_run
+from identification.models.structured.extrapolation import judged_by_input, with_what_is_open
 from identification.models.structured.fit import StructuredFit, drawn
 from identification.models.structured.model import Motion, StructuredModel
+from identification.prediction.steady_prediction import ResponseBand, SteadyPrediction
 from vibrolock.arrays import Complex, Float
 
 _SAMPLES = 32
@@ -61,6 +63,12 @@ class StructuredDynamics(BalancedModel):
         of = "the training data" if known else "the reach of their laws"
         return [f"elements reach {largest:.2f} times {of}: extrapolated"] if largest > 1.0 else []
 
+    def frequency_response(
+        self, request: SteadyRequest, band_hz: tuple[float | None, float | None]
+    ) -> SteadyPrediction:
+        """Return the fundamentals, with the range use of the force where that is larger."""
+        return judged_by_input(self.model, super().frequency_response(request, band_hz))
+
     def linear_response(self, frequency_hz: Float) -> Complex:
         """Return the sum over the modes of small vibrations, and the residual of the modes above."""
         at_rest, rows = self.model.linearised(), motion_rows(self.model.outputs)
@@ -85,3 +93,9 @@ class StructuredDynamics(BalancedModel):
             raise self.cannot("be drawn without its fit", "give the StructuredFit")
         for model in drawn(self.fit, count, seed):
             yield StructuredDynamics(model)
+
+    def with_what_is_open(
+        self, band: ResponseBand, response: SteadyPrediction, respond: Callable[[object], SteadyPrediction]
+    ) -> ResponseBand:
+        """Return a band that also holds laws that the training data do not tell from those of the fit."""
+        return band if self.fit is None else with_what_is_open(self.fit, band, response, respond)

@@ -1,6 +1,6 @@
 """What files of models that are simulated have in common: errors by experiment, spectra and a stretch of one experiment."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
 from pathlib import Path
@@ -13,8 +13,10 @@ from identification import (
     Experiment,
     IdentificationError,
     OutputStretch,
+    ResponseBand,
     RunScatter,
     SimulatedRun,
+    SteadyPrediction,
     error_spectra,
     output_stretch,
     simulated_run,
@@ -75,6 +77,12 @@ class SimulatedModel(Result):
     def allowed_by_fit(self, count: int) -> list[Simulator] | None:
         """Return models drawn by the covariance of the fit; None if it is unknown."""
         return None
+
+    def with_what_is_open(
+        self, band: ResponseBand, response: SteadyPrediction, respond: Callable[[Any], SteadyPrediction]
+    ) -> ResponseBand:
+        """Return the band of `allowed_by_fit` with what the data leave open; raise `IdentificationError` if it is too much."""
+        return band
 
     def check_trusted(self, path: Path | None, trusted: bool) -> None:
         """Raise `ConfigurationError` if the model names code of a user that is not trusted."""

@@ -30,6 +30,8 @@ from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simu
 
 _DRAWS = 40
 """Models of a band."""
+_ANYWHERE = 1e3
+"""Use of the trained range up to which responses of the ends of what the data leave open are followed."""
 
 
 def predict(path: Path, request: SimulatedPrediction) -> Predictions:
@@ -57,7 +59,7 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
         raise ConfigurationError("`bands`: are those of responses without a reference; add `forces_n` or `voltages_v`")
     responses = [frequency_response(model, **level, **fixed) for level in levels]
     others = _others(found, bands_asked, path) if levels else []
-    bands = [_band(others, level, fixed) for level in levels]
+    bands = [_band(found, others, level, fixed, response) for level, response in zip(levels, responses, strict=True)]
     steady = [Compared(one, band=band) for one, band in zip(responses, bands, strict=True)]
     steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
     models = SimulatedSweepModels(model, exciter, constants)
@@ -71,7 +73,7 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
         said = (*said, "a response has no band where most of the models that the fit allows have no such response")
     if any(bands):
         of = (
-            "the model that was fitted, by the covariance of the fit"
+            "the model that was fitted, by the covariance of the fit, the error that it left, and laws that fit as well"
             if found.scatter is None
             else "new runs, by the model's scatter from run to run alone"
         )
@@ -98,13 +100,21 @@ def _others(found: SimulatedModel, asked: bool, path: Path) -> Sequence[DrivenMo
     return cast(Sequence[DrivenModel], models)
 
 
-def _band(others: Sequence[DrivenModel], level: Level, fixed: Fixed) -> ResponseBand | None:
+def _band(
+    found: SimulatedModel, others: Sequence[DrivenModel], level: Level, fixed: Fixed, response: SteadyPrediction
+) -> ResponseBand | None:
     """Return the band of a response over other models; None if there are none, or if most have no such response."""
     responses: list[SteadyPrediction] = []
     for model in others:
         with suppress(IdentificationError):
             responses.append(frequency_response(model, **level, **fixed))
-    return band_of_responses(responses) if len(responses) > _DRAWS // 2 else None
+    if len(responses) <= _DRAWS // 2:
+        return None
+    band = band_of_responses(responses)
+    if found.scatter is not None:
+        return band
+    anywhere: Fixed = {**fixed, "largest_range_use": _ANYWHERE}
+    return found.with_what_is_open(band, response, lambda model: frequency_response(model, **level, **anywhere))
 
 
 def _check(request: SimulatedPrediction, model: DrivenModel, path: Path) -> None:

@@ -1,8 +1,10 @@
 """A structured model and its origin."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from identification import StructuredFit, StructuredModel
+from identification import ResponseBand, SteadyPrediction, StructuredFit, StructuredModel, dynamic_model
 from identification.experiments import Simulator
 from identification.models import UserSpring, drawn
 from rig.results.simulated.model import SimulatedModel
@@ -32,6 +34,15 @@ class IdentifiedStructured(SimulatedModel):
     def allowed_by_fit(self, count: int) -> list[Simulator] | None:
         """Return models drawn by the covariance of the fit; None if it is unknown."""
         return None if self.fit is None else list(drawn(self.fit, count))
+
+    def with_what_is_open(
+        self, band: ResponseBand, response: SteadyPrediction, respond: Callable[[Any], SteadyPrediction]
+    ) -> ResponseBand:
+        """Return the band with laws that the training data do not tell from those of the fit, and the error that it left.
+
+        Raises `identification.IdentificationError` if these laws differ too much.
+        """
+        return band if self.fit is None else dynamic_model(self.fit).with_what_is_open(band, response, respond)
 
 
 def whole(found: StructuredFit | StructuredModel) -> IdentifiedStructured:

@@ -126,9 +126,13 @@ def test_draws_scatter_as_the_covariance_says():
 
 
 def test_a_band_is_that_of_responses_of_draws():
-    band = response_band(fit_of(structured_duffing(), {"frequency 1": 1e-3}), 0.02, draws=20)
+    fit = fit_of(structured_duffing(), {"frequency 1": 1e-3})
+    band = response_band(fit, 0.02, draws=20)
     assert band.draws == 20
     assert band.peak_frequency_std_hz == pytest.approx(25e-3, rel=0.4)
+    # twice the error that the fit left, and the amplitude of a mode whose damping is known falls with the frequency squared
+    spread = 1.96 * band.peak_amplitude_std_m / frequency_response(fit, 0.02).peak().amplitude_m
+    assert spread == pytest.approx(2.0 * fit.training_error + 1.96 * 2.0e-3, rel=0.2)
 
 
 def test_what_has_no_covariance_is_not_drawn():
