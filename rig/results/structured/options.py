@@ -96,4 +96,4 @@ class StructuredPrediction(SimulatedPrediction):
     takes: ClassVar[str] = "a structured model, which answers"
 
     bands: bool = False
-    """Give the responses 95 % bands, from 40 models that the fit allows and laws that fit as well; takes as long as 46 responses."""
+    """Give the responses 95 % bands, from 40 models that the fit allows and laws that fit as well; in the time of 46."""
