@@ -81,7 +81,10 @@ if TYPE_CHECKING:
         structured_response as structured_response,
         structured_steady_state as structured_steady_state,
     )
-    from identification.errors import IdentificationError as IdentificationError
+    from identification.errors import (
+        ExtrapolationError as ExtrapolationError,
+        IdentificationError as IdentificationError,
+    )
     from identification.exciter_coupling.exciter import Exciter as Exciter, VoltagePath as VoltagePath
     from identification.exciter_coupling.exciter_fit import identify_exciter as identify_exciter
     from identification.experiments.errors import PnlssErrors as PnlssErrors
@@ -136,10 +139,7 @@ if TYPE_CHECKING:
     from identification.mapping.time_records import map_time_data as map_time_data
     from identification.measurements import PeriodicVibration as PeriodicVibration
     from identification.models.dynamic_model import DynamicModel as DynamicModel, dynamic_model as dynamic_model
-    from identification.models.modal.properties import (
-        ExtrapolationError as ExtrapolationError,
-        ModalProperties as ModalProperties,
-    )
+    from identification.models.modal.properties import ModalProperties as ModalProperties
     from identification.models.modal.recorded_force import recorded_force_response as recorded_force_response
     from identification.models.modal.sweep_inputs import VoltageSweep as VoltageSweep
     from identification.models.modal.sweep_prediction import (

@@ -6,9 +6,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from identification.errors import IdentificationError
+from identification.errors import ExtrapolationError, IdentificationError
 from identification.models.dynamic_model import SteadyRequest
-from identification.models.modal.properties import HIGHER_LEVELS, ExtrapolationError, ModalProperties
+from identification.models.modal.properties import HIGHER_LEVELS, ModalProperties
 from identification.models.modal.steady_states import OneMode, Path, fundamental_motion, range_notes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.steady_prediction import SteadyPrediction

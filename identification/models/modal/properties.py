@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.errors import IdentificationError
+from identification.errors import ExtrapolationError, IdentificationError
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.validation import finite_array
 from vibrolock.arrays import Float
@@ -30,10 +30,6 @@ _FEWEST_TAIL_LEVELS = 3  # levels that the line of the extrapolation takes at le
 _SAME_LEVEL = 0.02  # relative distance of modal amplitudes that are averaged as one level; chosen
 _LOWEST_OF_LAST = 0.01  # w^2 of a strongly softening mode ends at this share of its last value
 _DAMPING_FIELD = {"fundamental": "damping_ratio", "total-power": "damping_ratio_total_power"}
-
-
-class ExtrapolationError(IdentificationError):
-    """A nonlinear mode is evaluated beyond the multiple of its largest identified modal amplitude that is allowed."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

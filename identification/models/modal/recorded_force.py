@@ -9,10 +9,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.errors import ExtrapolationError
 from identification.frequency_responses import FrequencyResponse
 from identification.linear.modes import LinearModes
 from identification.models.modal.frequency_response import FARTHEST
-from identification.models.modal.properties import HIGHER_LEVELS, REFUSED_BEYOND, ExtrapolationError, ModalProperties
+from identification.models.modal.properties import HIGHER_LEVELS, REFUSED_BEYOND, ModalProperties
 from identification.models.modal.steady_states import OneMode, fundamental_motion, range_notes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.steady_prediction import SteadyPrediction

@@ -25,11 +25,11 @@ from typing import Literal
 
 import numpy as np
 
-from identification.errors import IdentificationError
+from identification.errors import ExtrapolationError, IdentificationError
 from identification.exciter_coupling.exciter import Exciter
 from identification.linear.modes import LinearModes
 from identification.models.modal.kernels import DIVERGED, modal_rate, slow_flow
-from identification.models.modal.properties import HIGHER_LEVELS, REFUSED_BEYOND, ExtrapolationError, ModalProperties
+from identification.models.modal.properties import HIGHER_LEVELS, REFUSED_BEYOND, ModalProperties
 from identification.models.modal.sweep_inputs import SweepInput, VoltageSweep, force_input, voltage_input
 from identification.models.modal.sweep_prediction import SweepPrediction
 from identification.nonlinear.nonlinear_modes import NonlinearMode

@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification import Channel, HalfPeriods, IdentificationError, Transient, demodulate, zero_crossings
+from identification import (
+    Channel,
+    ExtrapolationError,
+    HalfPeriods,
+    IdentificationError,
+    Transient,
+    demodulate,
+    zero_crossings,
+)
 from identification.exciter_coupling.exciter import Exciter
-from identification.models.modal.properties import ExtrapolationError, ModalProperties
+from identification.models.modal.properties import ModalProperties
 from identification.models.modal.sweep_inputs import VoltageSweep
 from identification.models.modal.sweep_prediction import SweepPrediction, compare_sweep
 from identification.models.modal.sweeps import predict_sweep
