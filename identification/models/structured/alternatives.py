@@ -27,6 +27,8 @@ _MOST_HIDDEN = 0.5
 """Largest stiffness of unseen sliders over the static stiffness in their direction. Chosen: the rest carries the structure."""
 _NEAR = 1e-4
 """Step of differences at the edge of the data, relative to it."""
+_FALL = 0.2
+"""Way over which damping falls to none, relative to the edge. Chosen: with a jump there often is no harmonic balance."""
 _NEVER = 1e6
 """Displacement, over the largest in the data, at which sliders slip that never do."""
 
@@ -71,7 +73,7 @@ class _Line(Spring):
 
 @dataclass(frozen=True, eq=False)
 class _Damping(Damper):
-    """Dampers; beyond ``edge`` ``left`` of their damping there, and ``factor`` times what the damping exceeds that by."""
+    """Dampers that fall beyond ``edge`` to ``left`` of their damping, and have ``factor`` times what they exceed it by."""
 
     kind = "damping"
     free: ClassVar = {}
@@ -87,7 +89,8 @@ class _Damping(Damper):
         for damper in self.dampers:
             inside = damper.damping(x)
             at_edge = float(damper.damping(np.array([self.edge]))[0])
-            found = found + np.where(size > self.edge, self.left * at_edge + self.factor * (inside - at_edge), inside)
+            fallen = at_edge * (self.left + (1.0 - self.left) * np.maximum(1.0 - (size / self.edge - 1.0) / _FALL, 0.0))
+            found = found + np.where(size > self.edge, fallen + self.factor * (inside - at_edge), inside)
         return np.asarray(np.maximum(found, 0.0))
 
 

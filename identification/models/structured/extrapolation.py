@@ -41,13 +41,13 @@ def secant(element: NonlinearElement) -> tuple[float, float, float]:
     """
     x = float(element.largest or element.reach)
     theta = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
-    along = x * np.cos(theta)
+    along = x * np.sin(theta)  # from rest at 0: a hysteresis remembers where it began
     force = np.interp(along, element.nodes, element.spring(element.laws)[0])
     sliding = np.zeros(_PHASES)
     joint_forces(element.sliders(element.laws), element.bends(element.laws), along, sliding)
-    whole = (2.0 / (_PHASES * x)) * np.sum((force + sliding) * np.exp(-1j * theta))
+    whole = (2.0 / (_PHASES * x)) * np.sum((force + sliding) * (np.sin(theta) + 1j * np.cos(theta)))
     damping = np.interp(along, element.nodes, element.damper(element.laws))
-    return float(whole.real), float(whole.imag), float(2.0 * np.mean(damping * np.sin(theta) ** 2))
+    return float(whole.real), float(whole.imag), float(2.0 * np.mean(damping * np.cos(theta) ** 2))
 
 
 def trained_force_n(model: StructuredModel, lowest_hz: float, highest_hz: float) -> float:
