@@ -195,6 +195,8 @@ class WorkerSession:
         """Start the device and the loop, which runs from now on; its rows wait in the ring until they are taken."""
         if not self._settled:
             self.settle_queue()
+        if not self.capabilities.repeatable:
+            settings.build(0.0)  # loads kernels, which on a busy computer takes longer than the ring lasts
         self._worker.send("start", settings, self._ring_s)
         delay_samples, layout, remarks, images, self.identity = self._worker.receive("started")
         self._loop = WorkerLoop(self._worker, settings, delay_samples, layout, self._counters, remarks, images)
