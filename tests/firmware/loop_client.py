@@ -226,11 +226,16 @@ def joined(blocks: list[Rows]) -> tuple[np.ndarray, np.ndarray]:
 
 @contextmanager
 def loop_host(
-    program: str = "host-sanitized", *, log: Path | None = None, lockstep: bool = True, **changes: Any
+    program: str = "host-sanitized",
+    *,
+    log: Path | None = None,
+    lockstep: bool = True,
+    plant: WatchedPlant | None = None,
+    **changes: Any,
 ) -> Iterator[LoopHost]:
-    """A board with the compiled tick, described by the bench, and its host."""
+    """A board with the compiled tick, described by the bench, and its host; with a structure, or the bench's own."""
     given = EmulatorSettings(wire=changes.pop("wire", "serial"), bench=bench_for_loop(), lockstep=lockstep, **changes)
-    plant = WatchedPlant(given.bench)
+    plant = plant or WatchedPlant(given.bench)
     arguments = () if log is None else ("--log-output", str(log))
     board = Board(description(given, plant), *arguments, program=built_with_loop(program))
     try:
