@@ -15,6 +15,8 @@ RATE_HZ = 12_800.0
 """Sample rate that is asked for, Hz; chosen: a delta-sigma input delays by 3 ms then, at 5 kHz by 8 ms."""
 BLOCK_S = 0.005
 """Duration of a block, s; chosen: a block costs a call for inputs and one for outputs."""
+AC_COUPLING_HZ = {"NI 9234": 0.5}
+"""Corner of the AC coupling of modules, Hz, which NI's driver does not tell (NI-9234 specifications, 377849B)."""
 PATIENCE_S = 10.0
 """Longest wait for the device, s."""
 
@@ -102,6 +104,9 @@ def _table(device: Attached, chassis: Chassis, channels: dict[str, Table], start
         for name, channel in channels.items()
     ]
     couplings = ["AC" if current else "" for current in currents]
+    for (name, channel), coupling in zip(channels.items(), couplings, strict=True):
+        if coupling and (corner_hz := AC_COUPLING_HZ.get(chassis.inputs[name].model)):
+            channel["input_high_pass_hz"] = corner_hz
     options: Table = {**device.options, "output": output, "inputs": list(channels)}
     options |= {"excitation_ma": currents, "coupling": couplings}
     free = [name for name in chassis.inputs if name not in channels]

@@ -254,6 +254,7 @@ def test_a_bench_begins_from_a_chassis_and_its_sensors_from_their_teds(chassis, 
     for found, there in zip(bench.channels, virtual.channels, strict=True):
         assert abs(found.sensitivity_v_per_unit) == pytest.approx(abs(there.sensitivity_v_per_unit), rel=1e-3)
         assert found.range_v == 5.0
+        assert found.input_high_pass_hz == (0.0 if found.loopback else 0.5)
     sensors = tomllib.loads((tmp_path / "ni-sensors.toml").read_text())["sensors"]
     assert len(sensors) == len(virtual.channels) - 1
     assert bench.driver.options["inputs"][-1] not in bench.driver.options["inputs"][:-1]
