@@ -24,6 +24,7 @@ from rig.tick.tick import Tick, TickSettings
 
 RING_S = 10.0  # of rows that wait for a late campaign; chosen
 LONGEST_SILENCE_S = 10.0  # until a loop process counts as hanging; chosen
+LOCKSTEP_SILENCE_S = 60.0  # the same in lockstep, where nothing is late however busy the computer is; chosen
 HUNG_S = 0.5  # beyond the ramp until a hanging process is killed; chosen
 TIMEOUT_S = 5.0  # beyond the ramp for a process to end; chosen
 
@@ -42,6 +43,8 @@ class WorkerLoop:
         counters: dict[str, int],
         remarks: tuple[str, ...],
         images: tuple[Image, ...],
+        *,
+        lockstep: bool = False,
     ) -> None:
         bench = settings.bench
         self.tick = Tick(settings, delay_samples)
@@ -54,7 +57,9 @@ class WorkerLoop:
         self.ended = False
         self._worker, self._memory = worker, SharedMemory(worker.memory, layout)
         self._ramp_down_s = bench.limits.ramp_down_s
-        self._silence_s = max(LONGEST_SILENCE_S, 50 * bench.block / bench.sample_rate_hz)
+        self._silence_s = max(
+            LOCKSTEP_SILENCE_S if lockstep else LONGEST_SILENCE_S, 50 * bench.block / bench.sample_rate_hz
+        )
         self._said: JsonObject = {}
 
     def run(self) -> Iterator[np.ndarray]:
@@ -199,7 +204,10 @@ class WorkerSession:
             settings.build(0.0)  # loads kernels, which on a busy computer takes longer than the ring lasts
         self._worker.send("start", settings, self._ring_s)
         delay_samples, layout, remarks, images, self.identity = self._worker.receive("started")
-        self._loop = WorkerLoop(self._worker, settings, delay_samples, layout, self._counters, remarks, images)
+        lockstep = self.capabilities.paced and self.capabilities.repeatable
+        self._loop = WorkerLoop(
+            self._worker, settings, delay_samples, layout, self._counters, remarks, images, lockstep=lockstep
+        )
         return self._loop
 
     def __enter__(self) -> Self:
