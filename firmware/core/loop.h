@@ -10,7 +10,7 @@ enum { VL_STATE_BYTES = 1280 }; /* for the state that is told with a block */
 void vl_begin_tick(void);
 bool vl_tick_get(uint8_t parameter, uint8_t item, uint32_t *value);
 enum vl_status vl_tick_resize(uint8_t place, uint32_t *bytes);
-/* Take a piece of an array of the records. False: it does not fit, or belongs to no array, or the device samples. */
+/* Take a piece of an array of the records, while nothing is sampled. False: it does not fit, or belongs to no array. */
 bool vl_take_record(uint8_t place, uint32_t offset, const uint8_t *bytes, uint32_t n);
 bool vl_tick_is_ready(uint32_t *why_not);
 void vl_restart_tick(void);

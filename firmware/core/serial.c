@@ -218,7 +218,7 @@ static void take_output(uint8_t version)
 /* A piece of the records of the loop on the device. */
 static bool take_record(size_t size)
 {
-    return size > RECORD_HEAD && size <= RECORD_HEAD + MOST_OF_RECORD
+    return !vl_is_sampling() && size > RECORD_HEAD && size <= RECORD_HEAD + MOST_OF_RECORD
            && vl_take_record(payload[4], vl_u32(payload + 8), payload + RECORD_HEAD, (uint32_t)(size - RECORD_HEAD));
 }
 

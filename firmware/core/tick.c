@@ -106,7 +106,7 @@ enum vl_status vl_tick_resize(uint8_t place, uint32_t *bytes)
 
 bool vl_take_record(uint8_t place, uint32_t offset, const uint8_t *bytes, uint32_t n)
 {
-    if (vl_is_sampling() || place >= VL_TICK_ARRAYS || offset > size[place] || n > size[place] - offset)
+    if (place >= VL_TICK_ARRAYS || offset > size[place] || n > size[place] - offset)
         return false;
     memcpy(pool + begin[place] + offset, bytes, n);
     return true;
