@@ -156,11 +156,12 @@ class DeviceLoop:
 
     def _finish(self) -> None:
         """Stop the device once all outcomes are known here; those lost on the way come again with later blocks."""
-        until = time.monotonic() + WHOLE_STATE_S
+        until, sample = time.monotonic() + WHOLE_STATE_S, self.tick.sample
         while not self._remote.agrees("outcomes", self.tick.outcomes) and time.monotonic() < until:
             _, state = self._remote.take()
             if state is not None:
                 self._note(state)
+        self.tick.arrays.loop["sample"] = sample  # of the last rows, not of those that were taken for their state
         self._remote.stop()
         self.ended = True
 

@@ -44,8 +44,12 @@ class RowBuffer:
     def take(self, first: int, end: int) -> Rows:
         """Return the rows of a point, and drop all rows up to the end of the point.
 
-        Rows that are not there any more, for it was told too late that they belong to the point, are marked as lost.
+        Rows that are not there any more, for it was told too late that they belong to the point, are not numbers, as lost ones.
         """
+        if self._spool is not None and first < self._first:
+            kept = LongRows(self._spool, 0, self._spool.size).whole()
+            self._spool, self._bytes = None, kept.nbytes
+            self._chunks.append((self._first, kept))
         if self._spool is not None:
             begin, stop = self._first, self._first + self._spool.size
             taken = LongRows(self._spool, first - begin, end - begin)

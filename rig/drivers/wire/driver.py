@@ -212,8 +212,8 @@ class WireDAQ(DAQ):
 
     @property
     def loop(self) -> Literal["computer", "device", "auto"]:
-        """Where the bench wants the loop to run."""
-        return self._options.loop
+        """Where the bench wants the loop to run. A wire that carries its rows has an option for it."""
+        return "computer"
 
     @property
     def loop_digest(self) -> str:

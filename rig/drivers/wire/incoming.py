@@ -144,6 +144,7 @@ class Incoming(Generic[Block]):
 
     def _wait(self) -> Block:
         until, looks = 0.0, LOOKS if self._kind is Rows else 1
+        waited_s = looks * self._timeout_s
         left_s, kind = self._timeout_s, self._kind
         while True:
             message = self._next(left_s)
@@ -161,7 +162,7 @@ class Incoming(Generic[Block]):
             until, left_s = 0.0, self._timeout_s
             if not looks:
                 raise DaqTimeout(
-                    f"{self._link.name}: the block at sample {self.expected} has not come within {self._timeout_s:g} s"
+                    f"{self._link.name}: the block at sample {self.expected} has not come within {waited_s:g} s"
                     f"{self._dialogue.damage()}; the device is silent or its cable is damaged"
                 )
 

@@ -33,11 +33,6 @@ class WireOptions(Configured):
     timeout_s: float | None = Field(None, gt=0, le=MOST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
 
-    loop: Literal["computer", "device", "auto"] = "computer"
-    """Where the loop runs. ``"device"``: in a device that was built with the same loop (`rig firmware tick`); it then needs no
-    computer between one sample and the next. On a serial line only. ``"auto"``: there if the device has the same loop, else on
-    the computer."""
-
     @property
     def queue(self) -> int:
         """Number of blocks; 1 until ``"auto"`` was replaced by a number (`rig.daq.DAQ.adjust`)."""
@@ -62,8 +57,8 @@ LONGEST_S, LONGEST_BLOCKS = 1.0, 10  # where something moves: so long an output 
 
 LOOP_S = 20.0
 """Default watchdog where the device runs the loop, s; chosen: limits and trips act there, without the computer."""
-LONGEST_LOOP_S = 600.0
-"""The longest one where something moves, s; chosen: for so long a vibration may go on that nobody watches."""
+SHORTEST_LOOP_S, LONGEST_LOOP_S = 1.0, 600.0
+"""The shortest one, s: ten pings; and the longest where something moves, for so long a vibration may go on unwatched."""
 
 
 def _default_s(block_s: float) -> float:
@@ -106,11 +101,15 @@ def watchdog_s(options: WireOptions, device_s: float, block_s: float, *, moves: 
 def loop_watchdog_s(options: WireOptions, device_s: tuple[float, float], *, moves: bool) -> float:
     """Watchdog time for a loop on the device, s; ``device_s``: shortest and longest that it can do.
 
-    Raises `DaqRefused` if the bench asks for one that is too long for a device that moves something.
+    Raises `DaqRefused` if it is too short for the pings that feed it, or too long for a device that moves something.
     """
     chosen_s = options.watchdog_s or min(max(LOOP_S, device_s[0]), device_s[1])
-    if moves and chosen_s > LONGEST_LOOP_S:
-        raise DaqRefused(field="driver.options.watchdog_s", value=chosen_s, allowed=f"up to {LONGEST_LOOP_S:g} s")
+    if chosen_s < SHORTEST_LOOP_S or (moves and chosen_s > LONGEST_LOOP_S):
+        raise DaqRefused(
+            field="driver.options.watchdog_s",
+            value=chosen_s,
+            allowed=f"{SHORTEST_LOOP_S:g} to {LONGEST_LOOP_S:g} s where the device runs the loop",
+        )
     return chosen_s
 
 

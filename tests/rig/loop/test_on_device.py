@@ -82,11 +82,23 @@ class AllButOneInFive:
         return number % 5 != 0
 
 
-def test_outcomes_whose_state_was_lost_are_known_at_the_end(device):
+def test_a_run_whose_states_are_lost_now_and_then_ends_with_the_device(device):
     device.lost_states = AllButOneInFive()
     loop, remote = started(device)
-    run(loop)
-    np.testing.assert_array_equal(loop.tick.outcomes, remote.arrays.outcomes)
+    rows = run(loop)
+    assert loop.tick.outcomes.tobytes() == remote.arrays.outcomes.tobytes()
+    assert loop.tick.sample == rows.size == remote.expected
+
+
+def test_outcomes_that_are_not_known_at_the_end_are_waited_for(device):
+    loop, _ = started(device)
+    last = run(loop).size // BLOCK
+    device.stop()
+    device.outcomes_from = last + 4
+    loop, remote = started(device)
+    rows = run(loop)
+    assert loop.tick.outcomes.tobytes() == remote.arrays.outcomes.tobytes()
+    assert loop.tick.sample == rows.size < remote.expected  # what was taken for its state alone has no rows
 
 
 def test_a_request_to_stop_is_a_ramp_on_the_device(device):

@@ -9,6 +9,7 @@ import pytest
 
 from rig.bench import load_bench
 from rig.campaigns.evaluation.acceptance import settled_point
+from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.rows import LongRows, Spool, mean_of, phases, std_of, stretches, turned_rad
 from rig.campaigns.evaluation.stored_point import stored
 from rig.campaigns.evaluation.transient_disturbance import has_transient_disturbance
@@ -78,6 +79,20 @@ def test_memory_does_not_grow_with_the_length_of_a_record(tmp_path):
     assert point.accepted, point.reason
     assert long < 1.1 * short
     assert long < 60e6  # one column of the inputs in double precision alone is 29 MB
+
+
+@pytest.mark.parametrize("in_memory_bytes", [1 << 25, 10_000])
+def test_rows_that_were_dropped_before_their_point_was_known_count_as_lost(tmp_path, in_memory_bytes):
+    buffer = RowBuffer(ROW, tmp_path, in_memory_bytes=in_memory_bytes)
+    whole = rows_of(0, 400)
+    buffer.add(0, whole[:100])
+    buffer.drop_before(100)
+    for first in (100, 200, 300):
+        buffer.add(first, whole[first : first + 100])
+    taken = buffer.take(40, 250)
+    np.testing.assert_array_equal(lost_rows(taken), np.arange(40, 250) < 100)
+    assert taken[60:].tobytes() == whole[100:250].tobytes()
+    assert buffer.take(250, 400)[:].tobytes() == whole[250:].tobytes()
 
 
 def test_a_buffer_keeps_few_rows_in_memory_and_gives_back_what_it_was_given(tmp_path):
