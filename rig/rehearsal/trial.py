@@ -5,7 +5,6 @@ from dataclasses import MISSING, dataclass, field, fields
 from itertools import count
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from rig.arming.run_options import Silent
@@ -18,6 +17,7 @@ from rig.campaigns.running.execution import Execution
 from rig.campaigns.running.runner import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
+from rig.rehearsal.peaks import Peaks
 from vibrolock.described import Described
 
 FURTHER_PART = 1 << 32
@@ -111,52 +111,13 @@ class Trial:
         return self.end in ("LOST_LOCK", "NO_LOCK", "NO_LOCK_IN_WINDOW") or any(p.quality in lost for p in self.points)
 
 
-class _Peaks:
-    """Largest value of every limited quantity over a run."""
-
-    def __init__(self, bench: Bench, limits: Rows) -> None:
-        self.bench = bench
-        self.moving = [i for i, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
-        gain, keep = float(limits["integrator_gain"][0]), 1.0 - float(limits["integrator_leak"][0])
-        self.numerator, self.denominator = [gain**2], [1.0, -2.0 * keep, keep**2]
-        self.state = np.zeros((2, len(self.moving)))
-        self.inputs = np.zeros(len(bench.channels))
-        self.moved_m = np.zeros(len(self.moving))
-        self.output_v = 0.0
-
-    def update(self, rows: Rows) -> None:
-        """Update the peaks by a chunk of rows. The displacement is integrated as the tick does (`rig.tick.safety.kernels`)."""
-        inputs = np.nan_to_num(rows["inputs"].astype(float))
-        self.inputs = np.maximum(self.inputs, np.abs(inputs).max(axis=0))
-        self.output_v = max(self.output_v, float(np.abs(rows["output_v"]).max()))
-        moved, self.state = scipy.signal.lfilter(
-            self.numerator, self.denominator, inputs[:, self.moving], axis=0, zi=self.state
-        )
-        self.moved_m = np.maximum(self.moved_m, np.abs(moved).max(axis=0))
-
-    def shares(self) -> dict[str, float]:
-        """Return every peak over its limit."""
-        limits, channels = self.bench.limits, self.bench.channels
-        out = {"voltage": self.output_v / limits.voltage_v}
-        for i, channel in enumerate(channels):
-            if channel.role == "monitor":
-                continue
-            limit = limits.force_n if channel.role == "force" else limits.acceleration_m_s2
-            quantity = "force" if channel.role == "force" else "acceleration"
-            out[f"{quantity} {channel.name}"] = float(self.inputs[i]) / limit
-            out[f"range {channel.name}"] = float(self.inputs[i]) / channel.range_in_unit
-        for i, moved in zip(self.moving, self.moved_m, strict=True):
-            out[f"displacement {channels[i].name}"] = float(moved) / limits.displacement_m
-        return out
-
-
 class _MemoryJournal:
     """Journal of a run in memory, which keeps the points and the end."""
 
     def __init__(self) -> None:
         self.points: list[Mapping[str, object]] = []
         self.ended: Mapping[str, object] = {}
-        self.peaks: _Peaks | None = None
+        self.peaks: Peaks | None = None
 
     def part(self, information: Mapping[str, object]) -> None:
         """Ignore the beginning of a part."""
@@ -216,7 +177,7 @@ def _part(
         segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
         settings = tick_settings(plan, bench, segments)
         loop = session.start(settings)
-        journal.peaks = journal.peaks or _Peaks(bench, loop.tick.arrays.limits)
+        journal.peaks = journal.peaks or Peaks(bench, loop.tick.arrays.limits)
         images = loop.images if images_known else ()
         execution = Execution(plan, bench, loop, journal, Silent(), before, images=images)
         execution.run({})

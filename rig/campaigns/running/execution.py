@@ -118,7 +118,7 @@ class Execution:
         whole = self.batched or plan.evaluates_approach
         evaluated = segments["point"] >= 0 if whole else np.isin(segments["kind"], list(EVALUATED))
         self.stored = StoredRows(plan, segments, evaluated, bench.sample_rate_hz)
-        self.evaluations = EvaluationThread()
+        self.evaluations = EvaluationThread(beside=not loop.waits)
         self.scale = StartJudgement(bench, plan, checked)
         self.start = Start(self.scale, loop)
         self.write_error: RecordingError | None = None

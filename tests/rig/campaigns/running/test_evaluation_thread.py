@@ -13,6 +13,23 @@ from tests.rig.campaigns.made_points import made_point
 from tests.rig.campaigns.running.test_runs import plan_with
 
 
+@pytest.mark.parametrize("beside", [True, False])
+def test_what_an_evaluation_raises_is_raised_where_its_points_are_taken(beside):
+    evaluations = EvaluationThread(beside=beside)
+    evaluations.ask(lambda: [][0])
+    with pytest.raises(IndexError):
+        evaluations.take()
+    evaluations.close()
+
+
+def test_without_a_thread_points_are_there_once_they_were_asked_for():
+    evaluations = EvaluationThread(beside=False)
+    evaluations.ask(lambda: [made_point(number=threading.get_ident())])
+    assert evaluations.ready()
+    assert [point.number for point in evaluations.take()] == [threading.get_ident()]
+    assert not evaluations
+
+
 def test_points_come_in_the_order_in_which_they_were_asked_for_also_those_that_need_no_evaluation():
     free = threading.Event()
     evaluations = EvaluationThread()
@@ -22,14 +39,6 @@ def test_points_come_in_the_order_in_which_they_were_asked_for_also_those_that_n
     free.set()
     assert [[point.number for point in evaluations.take()] for _ in range(2)] == [[0], [1]]
     assert not evaluations
-    evaluations.close()
-
-
-def test_what_an_evaluation_raises_is_raised_where_its_points_are_taken():
-    evaluations = EvaluationThread()
-    evaluations.ask(lambda: [][0])
-    with pytest.raises(IndexError):
-        evaluations.take()
     evaluations.close()
 
 
