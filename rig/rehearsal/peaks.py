@@ -3,16 +3,20 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.bench import Bench
 from vibrolock.arrays import Float, Int
 from vibrolock.compiled import kernel
 
+Rows = NDArray[np.void]
+"""Rows of a structured array."""
+
 
 class Peaks:
     """Largest value of every limited quantity over a run. ``limits``: the record of the tick's limits."""
 
-    def __init__(self, bench: Bench, limits: np.ndarray) -> None:
+    def __init__(self, bench: Bench, limits: Rows) -> None:
         self._bench = bench
         self._moving = np.array([i for i, one in enumerate(bench.channels) if one.role in ("drive", "response")])
         self._gain, self._keep = float(limits["integrator_gain"][0]), 1.0 - float(limits["integrator_leak"][0])
@@ -21,8 +25,8 @@ class Peaks:
         self._moved_m = np.zeros(self._moving.size)
         self._output_v = np.zeros(1)
 
-    def update(self, rows: np.ndarray) -> None:
-        """Update the peaks by a chunk of rows, those of lost samples as zeros. The displacement is integrated as the tick does."""
+    def update(self, rows: Rows) -> None:
+        """Update the peaks by a chunk of rows, lost samples as zeros. The displacement is integrated as the tick does."""
         largest(rows["inputs"], rows["output_v"], self._inputs, self._output_v)
         moved(rows["inputs"], self._moving, self._gain, self._keep, self._state, self._moved_m)
 

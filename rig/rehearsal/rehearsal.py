@@ -270,7 +270,7 @@ def rehearse(
     for count, draw in enumerate(done.values(), 1):
         progress(draw, count)
     missing = [number for number in range(request.draws) if number not in done]
-    for _, draw in ensemble({str(number): number for number in missing}, request, n_jobs=jobs):
+    for _, draw in ensemble({str(number): number for number in missing}, request, n_jobs=jobs, forks=True):
         done[draw.number] = draw
         if journal is not None:
             _append(journal, asdict(draw))

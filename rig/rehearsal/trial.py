@@ -5,7 +5,6 @@ from dataclasses import MISSING, dataclass, field, fields
 from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.arming.run_options import Silent
 from rig.bench import Bench
@@ -17,13 +16,11 @@ from rig.campaigns.running.execution import Execution
 from rig.campaigns.running.runner import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
-from rig.rehearsal.peaks import Peaks
+from rig.rehearsal.peaks import Peaks, Rows
 from vibrolock.described import Described
 
 FURTHER_PART = 1 << 32
 """Difference between the seeds of the parts of a run, so that each has other noise; chosen: above all numbers of draws."""
-Rows = NDArray[np.void]
-"""Rows of a structured array."""
 REFUSED = "REFUSED"
 """End of a trial whose plan the bench refuses before anything moves."""
 NOT_COMPUTED = "NOT_COMPUTED"
