@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "bytes.h"
+#include "rows.h"
 
 enum { STOP_ID = 0x000, BEAT_ID = 0x010, REQUEST_ID = 0x020, ANSWER_ID = 0x030, INDEX_ID = 0x040, PERIOD_ID = 0x050, READBACK_ID = 0x060, OUTPUT_ID = 0x100, SAMPLES_ID = 0x300 };
 enum { FUNCTION = 16, NODE_MASK = 0x00F, HIGHEST_ID = 0x7FF, HIGHEST_NODE = 15 };
@@ -92,6 +93,12 @@ static uint64_t patience_us(void)
 /* Before a block that would end more than half the sequence numbers after the last index, the host is told its index. */
 static void send_samples(const struct vl_samples *samples)
 {
+    was_given_up = false;
+    block = samples;
+    if (samples->is_of_loop) {
+        vl_can_send_rows(samples);
+        return;
+    }
     uint64_t first_group = samples->first / vl_in_force.block * sent.groups;
     bool must_tell = !was_told || first_group + sent.groups - told_group > sent.wrap / 2;
     if (must_tell || (!shape.fd && samples->flags != flags_told)) {
@@ -99,11 +106,9 @@ static void send_samples(const struct vl_samples *samples)
         told_group = first_group;
         was_told = true;
     }
-    block = samples;
     read_back = samples->put_out ? 0 : vl_in_force.block;
     group = part = 0;
     sequence = (uint32_t)(first_group % sent.wrap);
-    was_given_up = false;
     expires_us = board_clock_us() + patience_us();
 }
 
@@ -153,7 +158,9 @@ static void make_samples(struct vl_frame *frame)
 
 static void make_frame(struct vl_frame *frame)
 {
-    if (read_back < vl_in_force.block)
+    if (block->is_of_loop)
+        vl_can_frame_of_rows(frame);
+    else if (read_back < vl_in_force.block)
         make_readback(frame);
     else
         make_samples(frame);
@@ -161,6 +168,11 @@ static void make_frame(struct vl_frame *frame)
 
 static void next_frame(void)
 {
+    if (block->is_of_loop) {
+        if (!vl_can_next_of_rows())
+            block = NULL;
+        return;
+    }
     if (read_back < vl_in_force.block) {
         read_back += outputs_read_back();
         return;
@@ -173,7 +185,7 @@ static void next_frame(void)
         block = NULL;
 }
 
-/* Send what the bus takes. What has expired is given up. */
+/* Send what the bus takes. What has expired is given up; rows of the loop on the device are never out of date. */
 static bool is_idle(void)
 {
     struct vl_frame frame;
@@ -183,7 +195,7 @@ static bool is_idle(void)
         else
             make_frame(&frame);
         if (!board_send_frame(&frame)) {
-            if (board_clock_us() < expires_us)
+            if (board_clock_us() < expires_us || (block && block->is_of_loop))
                 return false;
             was_given_up = block != NULL;
             block = NULL;
@@ -405,6 +417,8 @@ static void take(const struct vl_frame *frame)
         take_output_index(frame);
     else if (is_configured && vl_in_force.version > 1 && function == PERIOD_ID)
         take_period(frame);
+    else if (shape.fd && vl_settings.version > VL_LOWEST_VERSION && function == VL_CAN_RECORD_ID)
+        vl_counters.malformed += vl_can_take_record(frame) ? 0 : 1;
     else if (is_configured && function >= OUTPUT_ID && function < OUTPUT_ID + FUNCTION * outputs)
         take_outputs(frame, (function - OUTPUT_ID) / FUNCTION);
     else
@@ -435,9 +449,11 @@ static bool fd_fits(const struct vl_description *about)
     return fits(about, FD_COUNTS);
 }
 
-/* Half of the sequence numbers, so that a missing frame can be told from a repeated one. */
+/* Half of the sequence numbers, so that a missing frame can be told from a repeated one; rows are bounded by their payload. */
 static uint32_t largest_block(void)
 {
+    if (vl_settings.loop)
+        return (VL_LARGEST_PAYLOAD - VL_ROWS_HEAD) / vl_row_bytes(&vl_settings);
     uint32_t samples = shape.wrap / 2 * shape.rows, outputs = shape.output_wrap / 2 * shape.output_rows;
     return samples < outputs ? samples : outputs;
 }
@@ -508,4 +524,5 @@ const struct vl_wire vl_can_fd = {
     .send_answer = send_answer,
     .send_heartbeat = send_heartbeat,
     .send_samples = send_samples,
+    .carries_rows = true,
 };

@@ -62,7 +62,8 @@ enum vl_parameter {
     VL_P_TICK_BYTES = 83,
     VL_P_TICK_PERIOD = 84,
     VL_P_TICK_CRC = 85,
-    VL_P_TICK_FAULT = 86
+    VL_P_TICK_FAULT = 86,
+    VL_P_STATE_BLOCKS = 87
 };
 
 /* A request or an answer: `code` is the command of one, the status of the other. */
@@ -84,8 +85,9 @@ struct vl_samples {
     uint8_t flags;
     const uint8_t *counts;
     const uint8_t *put_out; /* counts of the converter, where an output was missing; NULL: as handed over */
-    const uint8_t *state;   /* of the loop on the device, after the block: then `counts` are readings and rows. NULL: there is none */
-    uint32_t state_bytes;
+    bool is_of_loop;        /* on the device: `counts` are readings and rows */
+    const uint8_t *state;   /* of that loop, after the block */
+    uint32_t state_bytes;   /* 0: none is told with this block */
 };
 
 /* -- state.c: what all parts know ------------------------------------------------------------------------------------- */
@@ -94,6 +96,7 @@ struct vl_settings {
     uint32_t version, rate_mhz, block, queue, watchdog_us, ramp_us;
     uint32_t loop;        /* 1: the loop runs on the device */
     uint32_t tick_period; /* entries of a waveform of its records */
+    uint32_t state_blocks;/* blocks of rows, of which the last has the loop's state */
 };
 
 extern const struct vl_description *vl_about;

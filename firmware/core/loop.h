@@ -18,7 +18,7 @@ int32_t vl_tick_output(void); /* count of the last output, 0 before the first sa
 /* A sample: counts of the inputs, NULL if it was lost. False if the compiled code has failed; it must not be called again. */
 bool vl_tick(const int32_t counts[], uint16_t flags);
 void vl_keep_row(uint8_t *block, uint32_t index); /* the last sample's readings and row, at its place in a block */
-uint32_t vl_tick_state(uint8_t *into);            /* at most VL_STATE_BYTES; returns how many */
+uint32_t vl_tick_state(uint8_t *into);            /* at most VL_STATE_BYTES; returns how many, 0 where none is due */
 void vl_tick_ramp_locked(void);
 void vl_tick_release_locked(void);
 

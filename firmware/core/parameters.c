@@ -45,6 +45,7 @@ void vl_begin_parameters(uint32_t boot)
         .watchdog_us = within(100000, vl_about->shortest_watchdog_us, vl_about->longest_watchdog_us),
         .ramp_us = smaller(50000, vl_about->longest_watchdog_us),
         .tick_period = 1,
+        .state_blocks = 1,
     };
     vl_in_force = vl_settings;
     vl_begin_tick();
@@ -189,6 +190,9 @@ static uint32_t *setting(uint8_t parameter, uint32_t *lowest, uint32_t *highest)
     case VL_P_TICK_PERIOD:
         *highest = INT32_MAX;
         return has_tick ? &vl_settings.tick_period : NULL;
+    case VL_P_STATE_BLOCKS:
+        *highest = INT32_MAX;
+        return has_tick ? &vl_settings.state_blocks : NULL;
     default: return NULL;
     }
 }

@@ -225,7 +225,8 @@ static void end_block(void)
             .flags = (uint8_t)(seen | vl_latched()),
             .counts = block,
             .put_out = keep_readback(block + block_bytes),
-            .state = vl_has_loop() ? behind : NULL,
+            .is_of_loop = vl_has_loop(),
+            .state = behind,
             .state_bytes = vl_has_loop() ? vl_tick_state(behind) : 0,
         };
         write_at = after(write_at);

@@ -2,10 +2,11 @@
 
 #include "bytes.h"
 #include "device.h"
+#include "rows.h"
 
-enum { REQUEST = 1, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK, RECORD, STATE, ROWS };
+enum { REQUEST = 1, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK, RECORD };
 enum { RECORD_HEAD = 12, MOST_OF_RECORD = 512 };
-enum { HEADER = 4, COMMAND_SIZE = 12, SAMPLES_HEAD = 28, READBACK_HEAD = 12, STOP_SIZE = 5, CRC_SIZE = 4 };
+enum { HEADER = VL_PAYLOAD_HEAD, COMMAND_SIZE = 12, SAMPLES_HEAD = VL_ROWS_HEAD, READBACK_HEAD = 12, STOP_SIZE = 5, CRC_SIZE = 4 };
 enum { FIRST_OUTPUT_HEAD = 12, OUTPUT_HEAD = 20 }; /* in version 1, and since then with the period and the ramp */
 enum { AT_A_TIME = 128 }; /* bytes read at a call */
 
@@ -105,7 +106,7 @@ static void put_samples(const struct vl_samples *samples)
     uint8_t head[SAMPLES_HEAD - HEADER] = {0};
     vl_put(vl_put(vl_put(head, samples->first, 8), samples->clock_us, 8), samples->dropped, 4);
     head[20] = samples->flags;
-    begin_frame(samples->state ? ROWS : SAMPLES, block_number(samples));
+    begin_frame(samples->is_of_loop ? VL_ROWS : SAMPLES, block_number(samples));
     put(head, sizeof head);
     put(samples->counts, vl_in_force.block * vl_row_bytes(&vl_in_force));
     end_frame();
@@ -113,7 +114,7 @@ static void put_samples(const struct vl_samples *samples)
 
 static void put_state(const struct vl_samples *samples)
 {
-    begin_frame(STATE, block_number(samples));
+    begin_frame(VL_STATE, block_number(samples));
     put(samples->state, samples->state_bytes);
     end_frame();
 }
@@ -130,8 +131,8 @@ static void put_readback(const struct vl_samples *samples)
 
 static void send_samples(const struct vl_samples *samples)
 {
-    next = samples->put_out || samples->state ? samples : NULL;
-    if (samples->state)
+    next = samples->put_out || samples->state_bytes ? samples : NULL;
+    if (samples->state_bytes)
         put_state(samples);
     else if (next)
         put_readback(samples);

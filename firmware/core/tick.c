@@ -40,6 +40,8 @@ static struct tick_rows row;
 static double output_v;
 static double counts_per_v, lowest, highest;
 static uint32_t in_turn, refused_in_turn; /* what is told again with the next state */
+static uint32_t untold_blocks;   /* without a state, since the last one */
+static int64_t segment_told, mode_told;
 
 /* -- what is uploaded ------------------------------------------------------------------------------------------------------- */
 
@@ -76,6 +78,8 @@ bool vl_tick_get(uint8_t parameter, uint8_t item, uint32_t *value)
         *value = vl_settings.tick_period;
     else if (parameter == VL_P_TICK_FAULT && item == 0)
         *value = last_fault;
+    else if (parameter == VL_P_STATE_BLOCKS && item == 0)
+        *value = vl_settings.state_blocks;
     else if (parameter == VL_P_TICK_BYTES && item < VL_TICK_ARRAYS)
         *value = size[item];
     else if (parameter == VL_P_TICK_CRC && item < VL_TICK_ARRAYS)
@@ -147,7 +151,8 @@ void vl_restart_tick(void)
 {
     is_used = true;
     output_v = 0.0;
-    in_turn = refused_in_turn = 0;
+    in_turn = refused_in_turn = untold_blocks = 0;
+    segment_told = mode_told = INT64_MIN;
     for (uint32_t channel = 0; channel < vl_about->n_channels; channel++)
         v_per_count[channel] = (double)vl_about->channels[channel].v_per_count;
     counts_per_v = 1.0 / (double)vl_about->output_v_per_count;
@@ -210,8 +215,22 @@ static uint32_t next_of(uint32_t *turn, uint32_t n)
     return *turn;
 }
 
+/* A state is due with every so manieth block, and with one in which a segment has ended or the guard has changed. */
+static bool is_due(void)
+{
+    const int64_t segment = (int64_t)t.progress->segment, mode = (int64_t)t.guard->mode;
+    if (++untold_blocks < vl_in_force.state_blocks && segment == segment_told && mode == mode_told)
+        return false;
+    untold_blocks = 0;
+    segment_told = segment;
+    mode_told = mode;
+    return true;
+}
+
 uint32_t vl_tick_state(uint8_t *into)
 {
+    if (!is_due())
+        return 0;
     uint8_t *const first = into;
     const uint32_t segment = (uint32_t)t.progress->segment, last = (uint32_t)t.n_segments - 1;
     const uint32_t present = segment < last ? segment : last, refused = (uint32_t)t.progress->n_refused;

@@ -4,7 +4,7 @@ from pydantic import Field
 
 from rig.bench import Bench
 from rig.bench.configuration import Table, validated
-from rig.drivers.wire import WireDAQ, WireOptions
+from rig.drivers.wire import LoopOptions, WireDAQ
 from rig.wire.can.bus import FrameBus, PythonCanBus
 from rig.wire.can.frames import DATA_BIT_RATE_HZ, BusTiming
 from rig.wire.can.link import CanLink
@@ -12,7 +12,7 @@ from rig.wire.can.slcan import SlcanBus
 from rig.wire.link import Link
 
 
-class CanOptions(WireOptions):
+class CanOptions(LoopOptions):
     """Where the bus is, how fast it is, and which node the device has."""
 
     interface: str = Field("socketcan", min_length=1)

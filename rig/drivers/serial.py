@@ -1,25 +1,20 @@
 """`SerialDAQ`: a device on a serial port."""
 
-from typing import Literal
-
 from pydantic import Field
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
-from rig.drivers.wire import WireDAQ, WireOptions
+from rig.drivers.wire import LoopOptions, WireDAQ
 from rig.wire.serial.link import SerialLink
 
 
-class SerialOptions(WireOptions):
+class SerialOptions(LoopOptions):
     """Port and baud rate, besides the options that all wires share."""
 
     port: str = Field(min_length=1)
     """Name of the port, such as ``/dev/ttyACM0``; names under ``/dev/serial/by-id`` stay with the device."""
     baud: int = Field(3_000_000, ge=9600, le=12_000_000)
     """Bits per second, 8N1. A USB device that is its own serial port ignores it."""
-    loop: Literal["computer", "device", "auto"] = "computer"
-    """Where the loop runs. ``"device"``: in a device that was built with the same loop (`rig firmware tick`); it then needs no
-    computer between one sample and the next. ``"auto"``: there if the device has the same loop, else on the computer."""
 
 
 class SerialDAQ(WireDAQ):
@@ -31,11 +26,6 @@ class SerialDAQ(WireDAQ):
     def __init__(self, bench: Bench, seed: int = 0) -> None:
         self._serial_options = validated(SerialOptions, bench.driver.options, "driver.options")
         super().__init__(bench, seed, self._serial_options)
-
-    @property
-    def loop(self) -> Literal["computer", "device", "auto"]:
-        """Where the bench wants the loop to run."""
-        return self._serial_options.loop
 
     def _make_link(self) -> SerialLink:
         return SerialLink.port(self._serial_options.port, self._serial_options.baud)

@@ -6,20 +6,20 @@ between one sample and the next: limits and trips act there within a sample.
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
 from rig.daq import DAQ, LOST
-from rig.errors import DaqError, DaqMismatch, as_daq_error
+from rig.errors import DaqError, DaqMismatch, DaqRefused, as_daq_error
 from rig.loop.driven_loop import end_by_driver
 from rig.tick.layout import DEVICE_SHIFT, ROW, TickArrays
 from rig.tick.tick import Tick
 from rig.wire.messages import Rows, State
 
-WHOLE_STATE_S = 2.0  # after the end, for outcomes that were lost on the way; chosen
+WHOLE_STATE_S, WHOLE_OUTCOME_S = 2.0, 0.1  # after the end, for outcomes that were lost on the way, and for each; chosen
 ON_DEVICE = "the loop runs on the device: this computer collects its rows"
 
 
@@ -64,6 +64,12 @@ class RunsLoops(Protocol):
     @property
     def loop_digest(self) -> str:
         """Digest of the loop that the open device was built with; empty if it has none."""
+
+    def why_no_rows(self, block: int) -> str:
+        """Why the wire does not carry the rows of a loop on the open device in blocks of this size; empty if it does."""
+
+    def why_no_room(self, sizes: Mapping[str, int]) -> str:
+        """Why the open device does not hold records of these sizes (`record_sizes`); empty if it does."""
 
     @property
     def loop_latency_samples(self) -> float:
@@ -156,7 +162,8 @@ class DeviceLoop:
 
     def _finish(self) -> None:
         """Stop the device once all outcomes are known here; those lost on the way come again with later blocks."""
-        until, sample = time.monotonic() + WHOLE_STATE_S, self.tick.sample
+        longest_s = WHOLE_STATE_S + WHOLE_OUTCOME_S * self.tick.outcomes.size
+        until, sample = time.monotonic() + longest_s, self.tick.sample
         while not self._remote.agrees("outcomes", self.tick.outcomes) and time.monotonic() < until:
             _, state = self._remote.take()
             if state is not None:
@@ -172,19 +179,31 @@ class DeviceLoop:
             self._remote.stop()
 
 
-def runs_on_device(daq: RunsLoops) -> bool:
-    """Whether the loop of a bench runs on its open device.
+def why_on_computer(daq: RunsLoops, block: int) -> str:
+    """Why the computer runs the loop of an open device, as far as known before there is a plan; empty if the device does.
 
-    Raises `DaqMismatch` if the bench asks for that and the device has no loop, or another one than this computer.
+    ``block``: rows that the device would send at a time. A bench with ``loop = "computer"`` is no reason to tell.
+
+    Raises `DaqMismatch` if the bench asks for a loop on the device and the device has none, or another one than this computer;
+    `DaqRefused`, with the sum, if the wire does not carry its rows.
     """
+    if why := daq.why_no_rows(block):
+        if daq.loop == "auto":
+            return why
+        raise DaqRefused(why)
     theirs, why = daq.loop_digest, "the device has no loop of its own"
     if theirs:
         from rig.firmware.machine_code import kernels_digest
 
         ours = kernels_digest()
         if theirs == ours:
-            return True
+            return ""
         why = f"the device has another loop ({theirs[:12]}, here {ours[:12]}): build its firmware anew"
     if daq.loop == "auto":
-        return False
+        return why
     raise DaqMismatch(why, field="driver.options.loop", value=daq.loop, allowed="'computer' or 'auto' with this device")
+
+
+def record_sizes(arrays: TickArrays) -> dict[str, int]:
+    """Bytes of each of the records that a device needs for a run, by name."""
+    return {name: array.nbytes for name, array in zip(TickArrays._fields, arrays, strict=False)}

@@ -5,7 +5,7 @@ A virtual rig runs in this process, as fast as the machine allows. A rig with a 
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -44,14 +44,24 @@ class LocalSession:
         self.identity = daq.identity
         self.latched = daq.latched
 
-    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
+    def settle_queue(
+        self,
+        *,
+        feedback: bool = True,
+        delay_s: float = math.inf,
+        sizes: Mapping[str, int] | None = None,
+        may_change: bool = False,
+    ) -> QueueChoice | None:
         """Set the queue of the device for the run, once in a session and before `start`; return the choice.
 
         With ``queue_blocks = "auto"`` 0 V is exchanged with the device for a second and a half, see
         `rig.loop.worker.queue_choice.settle_queue`. ``feedback``: whether the plan's outputs answer what is measured;
         ``delay_s``: the longest delay that its gains bear. None if the driver has no queue to set. Conditions that the device
-        had latched when it was opened are reset, so the caller must be armed if there are any. Raises `rig.errors.DaqError`.
+        had latched when it was opened are reset, so the caller must be armed if there are any. ``sizes``: of the plan's records
+        (`rig.loop.on_device.record_sizes`), for a device that is to run the loop; if it has no room for them, the computer runs
+        the loop of a bench with ``loop = "auto"``, and of any if it ``may_change``. Raises `rig.errors.DaqError`.
         """
+        del sizes, may_change  # such a device has a process of its own
         self._daq.clear()
         self._settled = True
         return settle_queue(self._daq, self._bench, feedback=feedback, delay_s=delay_s)

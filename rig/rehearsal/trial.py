@@ -13,7 +13,7 @@ from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.attempts import MeasuredBefore
 from rig.campaigns.running.execution import Execution
-from rig.campaigns.running.runner import tick_settings
+from rig.campaigns.running.settings import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
 from rig.rehearsal.peaks import Peaks, Rows

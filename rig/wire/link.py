@@ -71,6 +71,11 @@ class Link(ABC):
     def load(self, stream: Stream) -> Load:
         """Load of this wire by a stream."""
 
+    def why_no_rows(self, stream: Stream) -> str:
+        """Why this wire cannot carry the rows of a loop on the device, whatever its speed; empty if it can."""
+        del stream
+        return ""
+
     @property
     def largest_block(self) -> int:
         """Largest number of samples in a block on this wire."""

@@ -20,6 +20,10 @@ LARGEST_PIECE = 512
 STATE_BYTES = 1280
 """Bytes that a device's state takes at most with all that frames it; for the load of a wire."""
 
+ENDED_SEGMENTS_HZ = 2.0
+"""Segments of a plan that end per second, each with a state of its own; for the load of a wire, chosen."""
+LOOP_PINGS_HZ = 10
+"""Pings per second that feed the watchdog of a loop on the device; chosen."""
 HEARTBEATS_HZ = 10
 """Heartbeats per second; every change of state or of what has latched sends a further one."""
 
@@ -176,6 +180,8 @@ class Parameter(IntEnum):
     """By array of the records: CRC-32 of what lies in the device."""
     TICK_FAULT = 86
     """Why the last START of a loop on the device was refused: 256 times the array, and a reason; 0 for none."""
+    STATE_BLOCKS = 87
+    """Set: blocks of rows, of which the last has the loop's state."""
 
 
 class Request(NamedTuple):
@@ -329,3 +335,11 @@ class Stream(NamedTuple):
     queue: int = 1
     loop: bool = False
     """Whether the device runs the loop, so that `Rows` and `State` come in place of samples."""
+    state_blocks: int = 1
+    """Blocks of rows, of which the last has a state; further states come with what ends a segment."""
+
+    @property
+    def states_hz(self) -> float:
+        """States per second of a loop on the device, with those of segments that end."""
+        blocks_hz = self.rate_hz / self.block
+        return min(blocks_hz, blocks_hz / self.state_blocks + ENDED_SEGMENTS_HZ)

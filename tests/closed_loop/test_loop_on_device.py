@@ -19,10 +19,10 @@ CLOSE = {"frequency_hz": 5e-4, "damping_ratio": 0.1, "amplitude_m": 0.02}
 with it the noise. What that makes of points is a tenth of these."""
 
 
-def require_the_virtual_run(plan, seed, output, tolerance):
+def require_the_virtual_run(plan, seed, output, tolerance, wire="serial"):
     """Points are those of the virtual rig whose loop acts at every sample, and all rows where ``tolerance`` is `EXACT`."""
     with (
-        emulated(BENCH, "serial", firmware=built_with_loop("host"), seed=seed, options={"loop": "device"}) as bench,
+        emulated(BENCH, wire, firmware=built_with_loop("host"), seed=seed, options={"loop": "device"}) as bench,
         rig.run(plan, bench=bench, seed=seed, output=output) as there,
         virtual(plan, AT_EVERY_SAMPLE, seed=seed) as here,
     ):
@@ -43,9 +43,15 @@ def require_the_virtual_run(plan, seed, output, tolerance):
         assert counted <= {"retries", "stray_answers"}
 
 
-def test_a_backbone_on_the_device_is_that_of_the_virtual_rig(tmp_path):
+@pytest.mark.parametrize("wire", ["serial", "can"])
+def test_a_backbone_on_the_device_is_that_of_the_virtual_rig(wire, tmp_path):
     plan = changed("magnet-beam/backbone", levels_v=[0.4], record_periods=8)
-    require_the_virtual_run(plan, 3, tmp_path / "there.h5", EXACT)
+    require_the_virtual_run(plan, 3, tmp_path / "there.h5", EXACT, wire)
+
+
+@pytest.mark.slow
+def test_the_shipped_backbone_over_can_fd_is_that_of_the_virtual_rig(tmp_path):
+    require_the_virtual_run(changed("magnet-beam/backbone"), 0, tmp_path / "there.h5", EXACT, "can")
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from rig import errors
 from rig.bench import DriverChoice
 from rig.drivers.serial import SerialDAQ
 from rig.drivers.wire.connection import Connection
+from rig.wire.loop_payloads import LARGEST_PAYLOAD
 from rig.wire.messages import (
     ARM_KEY,
     ROW_BYTES,
@@ -31,7 +32,7 @@ from rig.wire.messages import (
     Status,
     Stream,
 )
-from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec
+from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame
 from rig.wire.serial.link import line_load
 from tests.docs import wire

@@ -11,9 +11,21 @@ import pytest
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import Frame, frame_seconds
 from rig.wire.can.layout import compile_text
-from rig.wire.can.link import bus_load
+from rig.wire.can.link import bus_load, traffic
 from rig.wire.can.protocol import FrameKind, definition, protocol, shape_of
-from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Readback, Request, Samples, Stream
+from rig.wire.messages import (
+    Answer,
+    EmergencyStop,
+    Heartbeat,
+    Output,
+    Readback,
+    Record,
+    Request,
+    Rows,
+    Samples,
+    State,
+    Stream,
+)
 from tests.docs.pages import ROOT, blocks
 
 PAGE = ROOT / "docs" / "reference" / "wire-protocol-can.md"
@@ -86,6 +98,39 @@ def test_the_loads_are_those_that_the_driver_computes() -> None:
         for version, load in zip((1, 2), loads, strict=True):
             found = bus_load(shape_of(4, fd), Stream(4, int(n), float(rate_hz)), 1e6, data_bit_rate_hz, version)
             assert f"{found.share:.0%}" == load
+
+
+def test_the_loads_of_a_loop_on_the_device_are_those_that_the_driver_computes() -> None:
+    rows = table("bus of the loop | rate, Hz | channels")
+    assert len(rows) == 7
+    for bus, rate_hz, n_channels, *loads in rows:
+        rates = 1e6, 1e6 * float(bus.removesuffix(" Mbit/s").split("/")[1])
+        stream = Stream(int(n_channels), int(rate_hz) // 50, float(rate_hz), loop=True, state_blocks=5)
+        parts = [part.share for part in traffic(shape_of(stream.n_channels, True), stream, *rates)]
+        assert [f"{share:.0%}" for share in (*parts[:2], sum(parts))] == loads
+
+
+def test_the_known_answers_of_a_loop_on_the_device_are_sent_and_understood() -> None:
+    device, host = (CanCodec(protocol(2, True, 1), end, {}) for end in (True, False))
+    for end in (device, host):
+        end.speak(2)
+        end.configure(Stream(2, 1, 1000.0, loop=True))
+    said_and_sent: list[tuple[str, list[Frame]]] = []
+    for text, identifier, data in table("message of the loop | identifier | data"):
+        if text:
+            said_and_sent.append((text.strip("`"), []))
+        said_and_sent[-1][1].append(Frame(int(identifier, 16), bytes.fromhex(data), True))
+    assert [text.split("(")[0] for text, _ in said_and_sent] == ["Record", "State", "Rows", "State"]
+    for text, frames in said_and_sent:
+        message = eval(text, {kind.__name__: kind for kind in (Record, State, Rows)})
+        if isinstance(message, Rows):
+            message = message._replace(
+                readings=np.array(message.readings, np.float32), rows=np.array(message.rows, np.uint8)
+            )
+        sender, receiver = (host, device) if isinstance(message, Record) else (device, host)
+        assert sender.encode(message) == frames, text
+        (got,) = [one for frame in frames if (one := receiver.decode(frame)) is not None]
+        assert repr(got) == repr(message)
 
 
 def test_the_formulas_for_frames_are_those_in_use() -> None:

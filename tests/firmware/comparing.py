@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rig.wire.loop_payloads import Malformed
 from rig.wire.messages import DeviceFlag
-from rig.wire.serial.codec import Malformed
 from rig.wire.serial.frames import frame, payload_of
 from tests.firmware.events import SERIAL, Choice, Event, Kind
 from tests.firmware.python_device import PythonDevice

@@ -149,7 +149,9 @@ class LoopHost:
     def set(self, parameter: Parameter, value: int, item: int = 0) -> Answer:
         return self.ask(Command.SET, parameter, item, value)
 
-    def set_up(self, block: int = BLOCK, loop: int = 1, watchdog_s: float = WATCHDOG_S) -> None:
+    def set_up(
+        self, block: int = BLOCK, loop: int = 1, watchdog_s: float = WATCHDOG_S, state_blocks: int | None = None
+    ) -> None:
         """Agree on the version, on the stream, and on who runs the loop."""
         assert self.set(Parameter.VERSION, VERSION).status == 0
         self.codec.version = VERSION
@@ -161,6 +163,8 @@ class LoopHost:
             Parameter.RAMP_US: round(1e6 * RAMP_S),
             Parameter.LOOP: loop,
         }
+        if state_blocks is not None:
+            values[Parameter.STATE_BLOCKS] = state_blocks
         for parameter, value in values.items():
             assert self.set(parameter, value).status == 0, parameter
         stream = Stream(len(plant.names), block, plant.rate_hz, plant.bits, loop=bool(loop))

@@ -134,6 +134,26 @@ def test_states_say_what_the_records_are_at_the_end_of_their_blocks():
     assert (told.outcomes["outcome"] == Outcome.DONE).all()
 
 
+def test_a_state_comes_with_every_so_manieth_block_and_with_one_in_which_a_segment_ends():
+    settings, every = all_kinds(), 7
+    with loop_host("host") as host:
+        host.begin(tick_for(settings, host.plant).arrays, state_blocks=every)
+        assert host.get(Parameter.STATE_BLOCKS) == every
+        rows = host.run_until_off()[1]
+        told = {state.sample // BLOCK - 1 for state in host.states}
+    ends = np.arange(BLOCK - 1, rows.size, BLOCK)
+    seen = list(zip(rows["segment"][ends], rows["guard"][ends], strict=True))
+    due, since = {0}, 0
+    for block in range(1, len(seen)):
+        since += 1
+        if since == every or seen[block] != seen[block - 1]:
+            due.add(block)
+            since = 0
+    assert due <= told
+    assert len(told) < 0.5 * len(seen)
+    assert len(told - due) <= len(settings.segments)  # segments within the tick go on with the next sample's row
+
+
 def test_it_tells_the_digest_of_the_loop_that_is_linked_in_and_its_room():
     with loop_host() as host:
         host.set_up(loop=0)
@@ -144,9 +164,9 @@ def test_it_tells_the_digest_of_the_loop_that_is_linked_in_and_its_room():
         assert host.get(Parameter.LOOP) == 0
 
 
-def test_without_the_tick_over_can_and_in_version_1_it_knows_nothing_of_a_loop():
-    asks = [Request(1, Command.GET, one) for one in range(80, 87)]
-    asks += [Request(1, Command.SET, one, 0, 1) for one in range(80, 87)]
+def test_without_the_tick_over_classical_can_and_in_version_1_it_knows_nothing_of_a_loop():
+    asks = [Request(1, Command.GET, one) for one in range(80, 88)]
+    asks += [Request(1, Command.SET, one, 0, 1) for one in range(80, 88)]
     asks += [Request(1, Command.RAMP), Request(1, Command.RELEASE)]
 
     def require_unknown(answers: list[Answer]) -> None:
@@ -157,7 +177,7 @@ def test_without_the_tick_over_can_and_in_version_1_it_knows_nothing_of_a_loop()
         require_unknown([asked(plain, one._replace(number=n))[-1] for n, one in enumerate(asks, 1)])
     with loop_host() as host:
         require_unknown([host.ask(*one[1:]) for one in asks])
-    with loop_host(wire="can", node=NODE) as host:
+    with loop_host(wire="can", fd=False, node=NODE) as host:
         line = host.board
         line.send(b"O\r")
         seen = []

@@ -1,6 +1,6 @@
 """The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -28,6 +28,7 @@ from rig.campaigns.running.continuation import remaining
 from rig.campaigns.running.device_queue import armed_with_queue, settled_queue, with_queue
 from rig.campaigns.running.execution import Execution, end_without_measuring
 from rig.campaigns.running.output_file import back_up, forget_before, prepare_output, restore_backup
+from rig.campaigns.running.settings import tick_settings
 from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.campaigns.running.watched import watched_facts
 from rig.errors import ConfigurationError, RecordingError, RigError
@@ -42,7 +43,6 @@ from rig.system.stop_signals import deferred, ended_in_order
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.limits import describe_end
-from rig.tick.sequencer.segments import Segment
 from rig.tick.tick import TickSettings
 
 
@@ -63,7 +63,7 @@ def run_plan(plan: Plan, bench: Bench, output: Path, options: RunOptions | None 
     prepare_output(output, options.overwrite)
     with _published(plan, bench, output, options) as live:
         with open_session(bench, seed, realtime=options.realtime) as session:
-            facts = _facts(plan, bench, session, options)
+            facts = _facts(plan, bench, session, options, frozenset())
             header = Header(
                 kind=plan.kind,
                 configuration={
@@ -133,7 +133,7 @@ def resume_run(
             for point in points:
                 live.line("point", stored(point))
             with open_session(bench, drawn, realtime=options.realtime) as session:
-                facts = _facts(plan, bench, session, options)
+                facts = _facts(plan, bench, session, options, before.done)
                 _refuse_stopped(live)
                 run = _Run(plan, bench, output, options, live)
                 execution = run.measure(session, run.further_journal, {**information, "about": facts}, before)
@@ -241,7 +241,7 @@ class _Run:
                 names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
                 progress.remark(f"repeating point {names}: the disturbance may be over")
                 try:
-                    choice = settled_queue(self.plan, self.bench, session, self.options)
+                    choice = settled_queue(self.plan, self.bench, session, self.options, before.done | before.given_up)
                 except ConfigurationError as error:
                     progress.remark(f"nothing is measured again: {error}")
                     return Recording(self.output)
@@ -283,14 +283,17 @@ def _whole(output: Path, progress: Progress) -> Recording:
     return Recording(output)
 
 
-def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> About:
-    """Arm the bench and collect the facts recorded for a part: who armed it, operator, specimen, device, code."""
+def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions, done: Set[int]) -> About:
+    """Arm the bench and collect the facts recorded for a part: who armed it, operator, specimen, device, code.
+
+    ``done``: points of the plan that are not measured.
+    """
     purpose = options.about.purpose
     rehearsed = {} if purpose else rehearsal_facts(plan, bench, options.rehearsal, options.override_rehearsal)
     virtual = session.capabilities.virtual
     scale, unproven = known_scale(bench, session.identity, options.check, virtual=virtual)
     missing = [unproven, unproven_phase(bench, virtual=virtual)] if isinstance(plan, LockedPlan) else []
-    arming, choice = armed_with_queue(plan, bench, session, options)
+    arming, choice = armed_with_queue(plan, bench, session, options, done)
     remarks = [*calibration_remarks(bench, datetime.now(UTC).date()), *filter(None, missing)]
     facts: About = {
         **cast(About, options.about.facts()),
@@ -357,21 +360,3 @@ def _remember_end(bench: Bench, loop: RunningLoop, output: Path) -> None:
         remember(bench, trip=RememberedTrip(now(), text, str(output.absolute())))
     elif reason is not EndReason.NONE:
         remember(bench, trip=None)
-
-
-def tick_settings(
-    plan: Plan, bench: Bench, segments: tuple[Segment, ...], checked: CheckedScale | None = None
-) -> TickSettings:
-    """Return what a tick is built from to measure some segments of a plan; ``checked`` is the scale of the last check."""
-    return TickSettings(
-        bench,
-        plan.law,
-        plan.amplitude_law,
-        plan.settle_rule,
-        segments,
-        plan.waveforms(bench.sample_rate_hz),
-        plan.known_plant,
-        plan.retries,
-        start_judged=True,
-        per_volt=None if checked is None else (checked.newtons_per_volt, checked.acceleration_per_volt),
-    )

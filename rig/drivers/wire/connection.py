@@ -142,16 +142,22 @@ class Connection:
 
     def check_capacity(self, stream: Stream) -> None:
         """Raise `DaqRefused`, with the sum of the bits, if the wire cannot carry a stream."""
+        if why := self.why_not_carried(stream):
+            raise DaqRefused(why)
+
+    def why_not_carried(self, stream: Stream) -> str:
+        """Why the wire cannot carry a stream, with the sum of the bits; empty if it can."""
         assert self.facts is not None
         load = self.link.load(stream)
         self.load_share, self.needed_bit_s = load.share, load.needed_bit_s
         highest_hz = self.facts.rate_hz[1]
         self.sustainable_hz = min(highest_hz, MOST_LOAD * stream.rate_hz / load.share if load.share else math.inf)
-        if load.share >= MOST_LOAD:
-            raise DaqRefused(
-                f"{self.link.name}: {stream.rate_hz:g} Hz in blocks of {stream.block} would take "
-                f"{100.0 * load.share:.0f} % of the wire, allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
-            )
+        if load.share < MOST_LOAD:
+            return ""
+        return (
+            f"{self.link.name}: {stream.rate_hz:g} Hz in blocks of {stream.block} would take "
+            f"{100.0 * load.share:.0f} % of the wire, allowed is below {100.0 * MOST_LOAD:.0f} %: {load.sum_text}"
+        )
 
     def check_latch(self, forgiven: DeviceFlag = NOTHING) -> None:
         """Raise `DaqEmergencyStop` or `DaqWatchdog` if anything other than ``forgiven`` has latched."""

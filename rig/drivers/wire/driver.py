@@ -3,7 +3,7 @@
 import math
 import time
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -13,8 +13,15 @@ from rig.daq import DAQ, Adjustable, Capabilities
 from rig.drivers.wire.connection import MOST_LOAD, Connection
 from rig.drivers.wire.dialogue import latched_text
 from rig.drivers.wire.facts import DeviceFacts, remarks_on
-from rig.drivers.wire.options import LARGEST_QUEUE, WireOptions, raised_remark, watchdog_range_s, watchdog_s
-from rig.drivers.wire.remote_loop import RemoteLoop
+from rig.drivers.wire.options import (
+    LARGEST_QUEUE,
+    LoopOptions,
+    WireOptions,
+    raised_remark,
+    watchdog_range_s,
+    watchdog_s,
+)
+from rig.drivers.wire.remote_loop import RemoteLoop, why_no_room, why_no_rows
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
 from rig.text.disorder import LATE_BLOCKS, REORDERED_BLOCKS, disorder_text
 from rig.tick.layout import TickArrays
@@ -212,8 +219,18 @@ class WireDAQ(DAQ):
 
     @property
     def loop(self) -> Literal["computer", "device", "auto"]:
-        """Where the bench wants the loop to run. A wire that carries its rows has an option for it."""
-        return "computer"
+        """Where the bench wants the loop to run."""
+        return self._given.loop if isinstance(self._given, LoopOptions) else "computer"
+
+    def why_no_rows(self, block: int) -> str:
+        """Why the wire of the open device does not carry the rows of a loop on it in blocks of this size, with the sum."""
+        assert self._connection is not None
+        return why_no_rows(self._connection, len(self.channels), self.sample_rate_hz, block)
+
+    def why_no_room(self, sizes: Mapping[str, int]) -> str:
+        """Why the open device does not hold records of these sizes (bytes, by name), with the sum; empty if it does."""
+        assert self._connection is not None
+        return why_no_room(self._connection, sizes)
 
     @property
     def loop_digest(self) -> str:

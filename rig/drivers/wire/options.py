@@ -39,6 +39,15 @@ class WireOptions(Configured):
         return 1 if self.queue_blocks == "auto" else self.queue_blocks
 
 
+class LoopOptions(WireOptions):
+    """Options of wires that carry the rows of a loop on the device."""
+
+    loop: Literal["computer", "device", "auto"] = "computer"
+    """Where the loop runs. ``"device"``: in a device that was built with the same loop (`rig firmware tick`); it then needs no
+    computer between one sample and the next. ``"auto"``: there if the device has the same loop, the wire carries its rows and
+    the plan fits into the device's memory, else on the computer."""
+
+
 def check_inputs(inputs: Sequence[int | str], bench: Bench) -> None:
     """Raise `DaqRefused` unless there is one input of the device for each channel of a bench."""
     if len(inputs) != len(bench.channels):

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from zlib import crc32
 
 import numpy as np
@@ -13,10 +14,23 @@ from rig.drivers.wire.options import WireOptions, loop_watchdog_s
 from rig.drivers.wire.streaming import FLAG_NAMES, set_up
 from rig.errors import DaqProtocol, DaqRefused
 from rig.tick.layout import TickArrays
-from rig.wire.messages import ARM_KEY, LARGEST_PIECE, Answer, Command, Parameter, Record, Rows, State, Status, Stream
+from rig.tick.sequencer.layout import SEGMENT
+from rig.wire.messages import (
+    ARM_KEY,
+    LARGEST_PIECE,
+    LOOP_PINGS_HZ,
+    Answer,
+    Command,
+    Parameter,
+    Record,
+    Rows,
+    State,
+    Status,
+    Stream,
+)
 
 UPLOADS = 5  # of an array until the line counts as damaged; chosen
-PINGS_PER_S = 10.0  # chosen: they feed the watchdog
+STATE_EVERY_S = 0.1  # in which the device tells its state at least once; chosen: a state takes as much as 27 rows
 PING_LOST_S = 1.0  # until an unanswered ping counts as lost; chosen
 ALIGNMENT = 8  # bytes, of the arrays in the device
 REASONS = {
@@ -28,6 +42,35 @@ REASONS = {
     6: "has a voltage limit beyond the device's converter",
 }
 """Why a device refuses records, by the low byte of `Parameter.TICK_FAULT`."""
+
+
+def why_no_rows(connection: Connection, n_channels: int, rate_hz: float, block: int) -> str:
+    """Why the wire does not carry the rows of a loop on the device, with the sum; empty if it does."""
+    assert connection.facts is not None
+    if connection.lacks_room:
+        return (
+            f"{connection.link.name}: the wire has no room for version 2 of the protocol, of which the loop is a part"
+        )
+    stream = _stream(n_channels, block, rate_hz, connection.facts.bits)
+    return connection.link.why_no_rows(stream) or connection.why_not_carried(stream)
+
+
+def _stream(n_channels: int, block: int, rate_hz: float, bits: int) -> Stream:
+    state_blocks = max(1, math.floor(STATE_EVERY_S * rate_hz / block))
+    return Stream(n_channels, block, rate_hz, bits, 1, True, state_blocks)
+
+
+def why_no_room(connection: Connection, sizes: Mapping[str, int]) -> str:
+    """Why the device does not hold records of these sizes (bytes, by name), with the sum; empty if it does."""
+    room = connection.dialogue.get(Parameter.TICK_ROOM)
+    needed = sum(-(-size // ALIGNMENT) * ALIGNMENT for size in sizes.values())
+    if needed <= room:
+        return ""
+    largest = max(sizes, key=lambda name: sizes[name])
+    return (
+        f"{connection.link.name}: the plan takes {needed} bytes in the device, {sizes[largest]} of them {largest} "
+        f"({sizes['segments'] // SEGMENT.itemsize} segments), and it has room for {room}"
+    )
 
 
 class RemoteLoop:
@@ -48,7 +91,10 @@ class RemoteLoop:
         connection.set(Parameter.LOOP, 1, "driver.options.loop", 1, "")
         self.block = min(block, self._dialogue.get(Parameter.LARGEST_BLOCK))
         """Rows that the device sends at a time."""
-        stream = Stream(len(facts.names), self.block, rate_hz, facts.bits, 1, loop=True)
+        stream = _stream(len(facts.names), self.block, rate_hz, facts.bits)
+        tells = self._dialogue.ask(Command.SET, Parameter.STATE_BLOCKS, value=stream.state_blocks)
+        if tells.status != Status.DONE:  # it tells its state with every block
+            stream = stream._replace(state_blocks=1)
         connection.check_capacity(stream)
         connection.check_latch()
         wait_s = loop_watchdog_s(options, facts.watchdog_s, moves=not facts.simulated)
@@ -65,7 +111,7 @@ class RemoteLoop:
         self.flag_counts = dict.fromkeys(FLAG_NAMES, 0)
         """Samples by device flag."""
         self._blocks = 0
-        self._blocks_between_pings = max(1, round(stream.rate_hz / stream.block / PINGS_PER_S))
+        self._blocks_between_pings = max(1, round(stream.rate_hz / stream.block / LOOP_PINGS_HZ))
         self._ping: tuple[int, float] | None = None
 
     def begin(self) -> None:
@@ -137,15 +183,9 @@ class RemoteLoop:
 
     def _upload(self) -> None:
         contents = [array.tobytes() for array in self._arrays]
-        room = self._dialogue.get(Parameter.TICK_ROOM)
-        needed = sum(-(-len(content) // ALIGNMENT) * ALIGNMENT for content in contents)
-        if needed > room:
-            largest = max(range(len(contents)), key=lambda place: len(contents[place]))
-            raise DaqRefused(
-                f"{self._name}: the plan takes {needed} bytes in the device, {len(contents[largest])} of them "
-                f"{TickArrays._fields[largest]} ({len(self._arrays.segments)} segments), and it has room for {room}: use "
-                'fewer points, shorter waveforms, or driver.options.loop = "computer"'
-            )
+        sizes = {name: len(content) for name, content in zip(TickArrays._fields, contents, strict=True)}
+        if why := why_no_room(self._connection, sizes):
+            raise DaqRefused(why)
         for place, content in enumerate(contents):
             self._set(Parameter.TICK_BYTES, place, len(content))
         self._set(Parameter.TICK_PERIOD, 0, self._arrays.waveforms.shape[1])

@@ -39,7 +39,7 @@ class Collector:
         self._facts_descriptor = facts.fileno()
         self._parent = os.getppid()
         self._alone = self._released = self._stopped = False
-        self._samples = 0
+        self._samples = self._filled = 0  # in all, and those of the chunk under way
         self.cause = ""
 
     def run(self) -> None:
@@ -49,15 +49,26 @@ class Collector:
             self._samples += rows.size
             self._hand_over(readings, rows, time.monotonic_ns() - began_ns)
             self._look_round()
+        self._publish(time.monotonic_ns() - began_ns)
 
     def _hand_over(self, readings: np.ndarray, rows: np.ndarray, wall_ns: int) -> None:
         if self._alone or self._memory.free < 1:
             return
-        slot, n = self._memory.to_fill(), rows.size
-        slot.readings[:n] = readings
+        slot, begin, end = self._memory.to_fill(), self._filled, self._filled + rows.size
+        slot.readings[begin:end] = readings
         for name in ROW.names or ():
-            slot.rows[name][:n] = rows[name]
-        slot.head[:] = n, self._samples, 0, 0, wall_ns
+            slot.rows[name][begin:end] = rows[name]
+        self._filled = end
+        if end + rows.size > self._memory.layout.chunk:
+            self._publish(wall_ns)
+
+    def _publish(self, wall_ns: int) -> None:
+        """Hand over the rows of the chunk under way."""
+        if not self._filled:
+            return
+        slot = self._memory.to_fill()
+        slot.head[:] = self._filled, self._samples, 0, 0, wall_ns
+        self._filled = 0
         counts = list(self._loop.daq.counters.values())[: slot.counters.size]
         slot.counters[: len(counts)] = counts
         slot.state[:] = self._state

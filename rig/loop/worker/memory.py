@@ -56,12 +56,17 @@ def packed(arrays: TickArrays) -> tuple[TickArrays, np.ndarray]:
     return arrays._replace(**moved), memory
 
 
+def chunk_of(bench: Bench) -> int:
+    """Return the samples of a chunk of the ring: about 20 ms, whole blocks of the bench."""
+    return max(1, round(CHUNK_S * bench.sample_rate_hz / bench.block)) * bench.block
+
+
 @dataclass(frozen=True)
 class Layout:
     """Layout of the shared memory; both sides compute it from the same numbers."""
 
     chunk: int
-    """Samples of a chunk: about 20 ms, whole blocks."""
+    """Samples of a chunk: about 20 ms or a multiple, whole blocks."""
     slots: int
     """Chunks of the ring."""
     reserve: int
@@ -71,9 +76,12 @@ class Layout:
     state_bytes: int
 
     @classmethod
-    def of(cls, bench: Bench, arrays: TickArrays, n_counters: int, ring_s: float) -> "Layout":
-        """Return the layout for a bench and its tick's arrays; a campaign may be late by ``ring_s`` before a ramp begins."""
-        chunk = max(1, round(CHUNK_S * bench.sample_rate_hz / bench.block)) * bench.block
+    def of(cls, bench: Bench, arrays: TickArrays, n_counters: int, ring_s: float, times: int = 1) -> "Layout":
+        """Return the layout for a bench and its tick's arrays; a campaign may be late by ``ring_s`` before a ramp begins.
+
+        ``times``: how many times the usual chunk one has.
+        """
+        chunk = times * chunk_of(bench)
         chunk_s = chunk / bench.sample_rate_hz
         lead = int(arrays.loop["delay_whole"][0])
         reserve = math.ceil((bench.limits.ramp_down_s + lead / bench.sample_rate_hz) / chunk_s) + 4

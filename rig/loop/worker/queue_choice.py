@@ -43,6 +43,8 @@ class QueueChoice(NamedTuple):
     """Delay from an output to its effect with this queue, as far as known before the device runs."""
     text: str
     """The choice and its reason in one line; empty for a number of the bench."""
+    note: str = ""
+    """Why the computer runs the loop of a bench that would have it on the device; empty if it would not."""
 
     @property
     def remark(self) -> str:

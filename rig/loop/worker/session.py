@@ -3,7 +3,7 @@
 import math
 import pickle
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import TracebackType
 from typing import Self
@@ -189,11 +189,20 @@ class WorkerSession:
         """Number of the loop's process."""
         return self._worker.pid
 
-    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
+    def settle_queue(
+        self,
+        *,
+        feedback: bool = True,
+        delay_s: float = math.inf,
+        sizes: Mapping[str, int] | None = None,
+        may_change: bool = False,
+    ) -> QueueChoice | None:
         """Settle the queue of the device in its process, see `rig.loop.session.LocalSession.settle_queue`."""
-        self._worker.send("queue", {"feedback": feedback, "delay_s": delay_s})
+        self._worker.send("queue", {"feedback": feedback, "delay_s": delay_s}, dict(sizes or {}), may_change)
         choice: QueueChoice | None = self._worker.receive("queue")[0]
         self._settled = True
+        if choice is not None:  # the loop is the computer's after all
+            self.identity = {name: text for name, text in self.identity.items() if name != "loop"}
         return choice
 
     def start(self, settings: TickSettings) -> WorkerLoop:

@@ -7,6 +7,7 @@ import numpy as np
 from rig.errors import DaqRefused
 from rig.wire.can.blocks import Blocks, StreamFrames, check_stream
 from rig.wire.can.frames import Frame
+from rig.wire.can.loop_frames import LoopFrames
 from rig.wire.can.periods import PeriodsHeard, PeriodsTold
 from rig.wire.can.protocol import FrameKind, Protocol
 from rig.wire.can.readbacks import COUNT, Readbacks
@@ -19,8 +20,11 @@ from rig.wire.messages import (
     Message,
     Output,
     Readback,
+    Record,
     Request,
+    Rows,
     Samples,
+    State,
     Stream,
 )
 
@@ -48,6 +52,10 @@ class CanCodec:
         self._shape = protocol.shape
         self._counters = counters
         counters.update(dict.fromkeys(COUNTERS, 0))
+        self._loop: LoopFrames | None = None
+        if protocol.carries_rows:
+            records, states, rows = (protocol.identifiers[FrameKind.OF_LOOP, number] for number in range(3))
+            self._loop = LoopFrames((records, states, rows), counters)
         self.speak(LOWEST_VERSION)
         self._command = protocol.packing(FrameKind.REQUEST)
         self._beat = protocol.packing(FrameKind.HEARTBEAT)
@@ -65,6 +73,10 @@ class CanCodec:
 
     def configure(self, stream: Stream) -> None:
         """Set the shape of samples and outputs; both start at index 0. Errors: those of `check_stream`."""
+        if stream.loop and self._loop is not None:
+            self._loop.configure(stream, self.protocol.version)
+            self._stream = None  # there are no samples and no outputs
+            return
         check_stream(self._shape, stream)
         self._stream = stream
         self._flags, self._dropped = 0, 0
@@ -100,7 +112,9 @@ class CanCodec:
             return [self._heartbeat(message)]
         if isinstance(message, EmergencyStop):
             return [Frame(self._identifiers[FrameKind.EMERGENCY_STOP, 0], bytes((message.reason & 0xFF,)))]
-        raise DaqRefused("a device that runs the loop is reached by a serial line, not by CAN")
+        if isinstance(message, Record | State | Rows) and self._loop is not None:
+            return self._loop.encode(message, self.protocol.version)
+        raise DaqRefused("this bus has no frames for a loop on the device")
 
     def _heartbeat(self, beat: Heartbeat) -> Frame:
         dropped = min(beat.dropped, _LARGEST_DROPPED)
@@ -152,6 +166,8 @@ class CanCodec:
         try:
             if kind is FrameKind.READBACK and not self._device:
                 return self._decode_readback(frame)
+            if kind is FrameKind.OF_LOOP and self._loop is not None:
+                return self._loop.decode(frame, frame.identifier)
             return self._decode_command(kind, frame.data)
         except (struct.error, ValueError):
             self._counters["damaged_frames"] += 1

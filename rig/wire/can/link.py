@@ -8,11 +8,23 @@ from rig.wire.can.blocks import check_stream, pieces_of
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import BusTiming, frame_seconds
+from rig.wire.can.loop_frames import lengths_of_rows
 from rig.wire.can.periods import TOLD_EVERY_S
 from rig.wire.can.protocol import Shape, protocol
 from rig.wire.can.readbacks import Readbacks
 from rig.wire.link import LATE_SHARE, Link, Load
-from rig.wire.messages import HEARTBEATS_HZ, LOWEST_VERSION, VERSION, Message, Output, Readback, Samples, Stream
+from rig.wire.loop_payloads import ROWS_HEAD, rows_bytes
+from rig.wire.messages import (
+    HEARTBEATS_HZ,
+    LOOP_PINGS_HZ,
+    LOWEST_VERSION,
+    VERSION,
+    Message,
+    Output,
+    Readback,
+    Samples,
+    Stream,
+)
 
 
 class Traffic(NamedTuple):
@@ -29,12 +41,22 @@ def traffic(
 ) -> list[Traffic]:
     """Samples, outputs, heartbeats and output indices of a stream; from version 2 on also periods and readbacks.
 
-    Periods are told as often as they may be, and one block in twenty is counted as late, with its readback.
+    Periods are told as often as they may be, and one block in twenty is counted as late, with its readback. With the loop on
+    the device: rows, states, heartbeats and pings.
     """
     blocks_hz = stream.rate_hz / stream.block
 
     def seconds(lengths: list[int]) -> float:
         return sum(frame_seconds(length, shape.fd, bit_rate_hz, data_bit_rate_hz) for length in lengths)
+
+    if stream.loop:
+        rows, state = lengths_of_rows(stream)
+        told = [("rows", blocks_hz, rows), ("states", stream.states_hz, state)]
+        small = (("heartbeats", HEARTBEATS_HZ), ("pings and their answers", 2 * LOOP_PINGS_HZ))
+        return [
+            *(Traffic(name, hz * len(lengths), hz * seconds(lengths)) for name, hz, lengths in told),
+            *(Traffic(name, hz, hz * frame_seconds(8, False, bit_rate_hz)) for name, hz in small),
+        ]
 
     out, marks_hz = [], []
     for name, outputs, wrap in (("samples", False, shape.wrap), ("outputs", True, shape.output_wrap)):
@@ -153,8 +175,24 @@ class CanLink(Link):
 
         Raises `DaqRefused` for a stream that no frames can carry, however fast the bus.
         """
-        check_stream(self._protocol.shape, stream)
+        if not stream.loop:
+            check_stream(self._protocol.shape, stream)
         return bus_load(self._protocol.shape, stream, *self._rates_hz, self.version)
+
+    def why_no_rows(self, stream: Stream) -> str:
+        """With the sum of the rows' bits where the bus is a classical one."""
+        if self._protocol.carries_rows:
+            return ""
+        if self._protocol.shape.fd:
+            return (
+                f"{self.name}: its definition of frames (driver.options.dbc) leaves no identifiers for rows of a loop"
+            )
+        row = rows_bytes(stream.n_channels, 1) - ROWS_HEAD.size
+        needed, rate = 8.0 * row * stream.rate_hz, self._rates_hz[0]
+        return (
+            f"{self.name}: a loop on the device needs CAN FD: its rows take {stream.rate_hz:g} Hz x {row} bytes = "
+            f"{needed / 1e6:.2f} Mbit/s without what frames them, and this classical bus has {rate / 1e6:g} Mbit/s"
+        )
 
     @property
     def layout_crc(self) -> int:

@@ -7,6 +7,7 @@ An identifier of 11 bits is 16 times a function plus the node (0 to 15). The low
     0x020, 0x030 Request, Answer
     0x040        OutputIndex
     0x050, 0x060 OutputPeriod, Readback (from version 2 on)
+    0x070-0x090  records, state and rows of a loop on the device (CAN FD; no part of the DBC file: bytes without signals)
     0x100-0x2F0  Output (classical: 32 messages of one layout, the sequence is in the identifier)
     0x300-0x6F0  Samples (classical: up to 64 such messages; of each sequence one per part where a row needs several frames)
 """
@@ -163,8 +164,11 @@ class FrameKind(Enum):
     READBACK = "Readback"
     OUTPUT = "Output"
     SAMPLES = "Samples"
+    OF_LOOP = "a loop on the device"
 
 
+LOOP_IDENTIFIERS = (0x070, 0x080, 0x090)
+"""Records, states and rows of a loop on the device."""
 SINCE_VERSION_2 = (FrameKind.OUTPUT_PERIOD.value, FrameKind.READBACK.value)
 
 
@@ -185,7 +189,15 @@ class Protocol:
             kind = FrameKind(base)
             node = 0 if kind is FrameKind.EMERGENCY_STOP else self.node
             out[message.frame_id + node] = (kind, int(number or 0))
+        if self.carries_rows:
+            out |= {base + self.node: (FrameKind.OF_LOOP, number) for number, base in enumerate(LOOP_IDENTIFIERS)}
         return out
+
+    @property
+    def carries_rows(self) -> bool:
+        """Whether there are frames for a loop on the device: over CAN FD, unless a file gives their identifiers to others."""
+        taken = {message.frame_id for message in self.layout.messages.values()}
+        return self.shape.fd and self.version > LOWEST_VERSION and taken.isdisjoint(LOOP_IDENTIFIERS)
 
     @cached_property
     def identifiers(self) -> dict[tuple[FrameKind, int], int]:

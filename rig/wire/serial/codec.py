@@ -1,16 +1,22 @@
 """Messages as bytes: a header of four bytes, a body of fixed form, little-endian; see ``docs/reference/wire-protocol.md``."""
 
 import struct
-from collections.abc import Iterator
 
 import numpy as np
 
 from rig.errors import DaqRefused
+from rig.wire.loop_payloads import (
+    LARGEST_PAYLOAD,
+    MOST_DROPPED,
+    RECORD,
+    ROWS,
+    STATE,
+    LoopPayloads,
+    Malformed,
+    rows_bytes,
+)
 from rig.wire.messages import (
-    LARGEST_PIECE,
     LOWEST_VERSION,
-    ROW_BYTES,
-    STATE_BYTES,
     VERSION,
     Answer,
     EmergencyStop,
@@ -18,19 +24,12 @@ from rig.wire.messages import (
     Message,
     Output,
     Readback,
-    Record,
     Request,
-    Rows,
     Samples,
-    State,
     Stream,
 )
 
-LARGEST_PAYLOAD = 65_536
-"""Largest header and body of any message, bytes; it bounds a receiver's memory."""
-
-
-REQUEST, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK, RECORD, STATE, ROWS = range(1, 11)
+REQUEST, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK = range(1, 8)
 """Second byte of a payload."""
 LASTING = (REQUEST, ANSWER, EMERGENCY_STOP)  # the same in every version, so that versions can be agreed on
 
@@ -45,17 +44,6 @@ PERIODIC_HEAD = struct.Struct("<BBHQII")  # first; period; ramp: an output from 
 READBACK_HEAD = struct.Struct("<BBHQ")  # first
 HEARTBEAT_BODY = struct.Struct("<BBHBBHII")  # state; boot; flags; dropped; samples
 STOP = struct.Struct("<BBHB")  # reason
-RECORD_HEAD = struct.Struct("<BBHBxxxI")  # array; offset
-STATE_HEAD = struct.Struct("<BBHQ")  # sample
-PIECE_HEAD = struct.Struct("<BxHI")  # array; length; offset: a piece of a state
-
-MOST_DROPPED = 2**32 - 1  # samples: 32 bits
-
-
-class Malformed(ValueError):  # noqa: N818 (a remark on a frame)
-    """A frame that arrived intact and is no message of this protocol, or no block of the stream agreed on."""
-
-    counter = "malformed"
 
 
 class ForeignVersion(Malformed):
@@ -88,7 +76,7 @@ class Codec:
         self._counts = np.dtype("<i2")
         self._shape, self._output_shape = (0, 0), (0,)
         self._samples_size = self._output_size = self._readback_size = 0  # of no payload: none before `configure`
-        self._rows_size = 0  # where the device runs the loop; it then sends no samples
+        self._loop = LoopPayloads()
 
     def configure(self, stream: Stream) -> None:
         """Agree on the shape of blocks.
@@ -105,7 +93,7 @@ class Codec:
         self._counts = np.dtype(f"<i{stream.bits // 8}")
         self._shape, self._output_shape = (stream.block, stream.n_channels), (stream.block,)
         self._samples_size, self._output_size, self._readback_size = samples_size, output_size, readback_size
-        self._rows_size = samples_size if stream.loop and self.version > LOWEST_VERSION else 0
+        self._loop.configure(stream, self.version)
 
     @staticmethod
     def sizes(stream: Stream, version: int) -> tuple[int, int, int]:
@@ -113,7 +101,7 @@ class Codec:
         width = stream.bits // 8
         samples = SAMPLES_HEAD.size + width * stream.block * stream.n_channels
         if stream.loop and version > LOWEST_VERSION:
-            samples = SAMPLES_HEAD.size + stream.block * (4 * stream.n_channels + ROW_BYTES)
+            samples = rows_bytes(stream.n_channels, stream.block)
         if version == LOWEST_VERSION:
             return samples, OUTPUT_HEAD.size + width * stream.block, 0
         return samples, PERIODIC_HEAD.size + width * stream.block, READBACK_HEAD.size + width * stream.block
@@ -152,7 +140,7 @@ class Codec:
             return HEARTBEAT_BODY.pack(version, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples & 0xFFFFFFFF)
         if isinstance(message, EmergencyStop):
             return STOP.pack(version, EMERGENCY_STOP, 0, message.reason)
-        return self._encoded_of_loop(message)
+        return self._loop.encode(message, version)
 
     def decode(self, payload: bytes) -> Message:
         """Decode a payload into a message. Arrays of counts are views of the payload, not copies. Raises only `Malformed`."""
@@ -162,12 +150,12 @@ class Codec:
         version, kind = payload[0], payload[1]
         if version != self.version and kind not in LASTING and not (kind == HEARTBEAT and version in SPOKEN):
             raise ForeignVersion(f"version {version}")
-        if kind == SAMPLES and size == self._samples_size and not self._rows_size:
+        if kind == SAMPLES and size == self._samples_size and not self._loop.rows_size:
             _, _, sequence, first, clock_us, dropped, flags = SAMPLES_HEAD.unpack_from(payload)
             counts = np.ndarray(self._shape, self._counts, payload, SAMPLES_HEAD.size)
             return Samples(first, counts, flags, dropped, clock_us, sequence)
         if kind in (RECORD, STATE, ROWS) and version > LOWEST_VERSION:
-            return self._decoded_of_loop(kind, payload)
+            return self._loop.decode(payload)
         if kind == OUTPUT and size == self._output_size:
             head = PERIODIC_HEAD if self._readback_size else OUTPUT_HEAD  # of the version agreed on with the stream
             _, _, sequence, first, *goes_on = head.unpack_from(payload)
@@ -186,39 +174,6 @@ class Codec:
             return EmergencyStop(STOP.unpack(payload)[3])
         raise Malformed(f"type {kind} with {size} bytes")
 
-    def _encoded_of_loop(self, message: Message) -> bytes:
-        """The payload of a message for or from a device that runs the loop."""
-        version = self.version
-        if isinstance(message, Record):
-            return RECORD_HEAD.pack(version, RECORD, 0, message.array, message.offset) + message.data
-        if isinstance(message, State):
-            pieces = (PIECE_HEAD.pack(one.array, len(one.data), one.offset) + one.data for one in message.pieces)
-            return STATE_HEAD.pack(version, STATE, 0, message.sample) + b"".join(pieces)
-        if isinstance(message, Rows):
-            first, readings, rows, flags, dropped, clock_us, sequence = message
-            if readings.shape != self._shape or not self._rows_size:
-                raise DaqRefused(f"readings of shape {readings.shape}: allowed is {self._shape}, the stream agreed on")
-            dropped = min(dropped, MOST_DROPPED)
-            head = SAMPLES_HEAD.pack(version, ROWS, sequence & 0xFFFF, first, clock_us, dropped, flags)
-            return head + readings.astype("<f4").tobytes() + rows.tobytes()
-        raise TypeError(f"{message!r} is not a message")
-
-    def _decoded_of_loop(self, kind: int, payload: bytes) -> Message:
-        """The message of a payload for or from a device that runs the loop. Raises only `Malformed`."""
-        size = len(payload)
-        if kind == ROWS and size == self._rows_size and size:
-            _, _, sequence, first, clock_us, dropped, flags = SAMPLES_HEAD.unpack_from(payload)
-            block = self._shape[0]
-            readings = np.ndarray(self._shape, "<f4", payload, SAMPLES_HEAD.size)
-            rows = np.ndarray((block, ROW_BYTES), np.uint8, payload, SAMPLES_HEAD.size + readings.nbytes)
-            return Rows(first, readings, rows, flags, dropped, clock_us, sequence)
-        if kind == RECORD and RECORD_HEAD.size < size <= RECORD_HEAD.size + LARGEST_PIECE:
-            _, _, _, array, offset = RECORD_HEAD.unpack_from(payload)
-            return Record(array, offset, payload[RECORD_HEAD.size :])
-        if kind == STATE and STATE_HEAD.size <= size <= STATE_BYTES:
-            return State(STATE_HEAD.unpack_from(payload)[3], tuple(_pieces(payload)))
-        raise Malformed(f"type {kind} with {size} bytes")
-
     def _fitted(self, counts: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         if counts.shape == shape and counts.dtype is self._counts and self._samples_size:
             return counts
@@ -227,18 +182,3 @@ class Codec:
         if counts.shape != shape:
             raise DaqRefused(f"counts of shape {counts.shape}: allowed is {shape}, the stream agreed on")
         return counts.astype(self._counts)
-
-
-def _pieces(payload: bytes) -> Iterator[Record]:
-    """The pieces of a state. Raises `Malformed`."""
-    at = STATE_HEAD.size
-    while at < len(payload):
-        if at + PIECE_HEAD.size > len(payload):
-            raise Malformed(f"a piece of a state with {len(payload) - at} bytes")
-        array, length, offset = PIECE_HEAD.unpack_from(payload, at)
-        at += PIECE_HEAD.size
-        data = payload[at : at + length]
-        if len(data) < length:
-            raise Malformed(f"{len(data)} of {length} bytes of a state")
-        yield Record(array, offset, data)
-        at += length

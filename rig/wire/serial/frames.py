@@ -8,8 +8,9 @@ from zlib import crc32
 
 from cobs.cobs import DecodeError, decode, encode
 
+from rig.wire.loop_payloads import LARGEST_PAYLOAD, Malformed
 from rig.wire.messages import STATE_BYTES, Message, Stream
-from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Oversize
+from rig.wire.serial.codec import Codec, Damaged, Oversize
 
 CRC_SIZE = 4  # bytes of a CRC-32
 CRC = struct.Struct("<I").pack

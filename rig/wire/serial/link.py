@@ -34,8 +34,8 @@ def line_load(stream: Stream, baud: int | None, version: int = VERSION) -> Load:
     terms = f"{blocks_hz:g}/s x {samples} bytes of samples + {HEARTBEATS_HZ}/s x {heartbeat} bytes of heartbeats"
     if stream.loop:
         state = largest_frame(STATE_BYTES) + 1
-        needed += BITS_A_BYTE * blocks_hz * state
-        terms += f" + {blocks_hz:g}/s x {state} bytes of the loop's state"
+        needed += BITS_A_BYTE * stream.states_hz * state
+        terms += f" + {stream.states_hz:g}/s x {state} bytes of the loop's state"
     elif readback_size:
         late_hz, readback = LATE_SHARE * blocks_hz, largest_frame(readback_size)
         needed += BITS_A_BYTE * late_hz * readback

@@ -3,7 +3,6 @@
 import pytest
 
 from rig.drivers import make_daq
-from rig.drivers.can import CanOptions
 from rig.drivers.nidaqmx.options import NiDaqmxOptions
 from rig.drivers.sound.options import SoundOptions
 from rig.drivers.wire import WireOptions
@@ -14,14 +13,15 @@ from tests.refused import refused
 from tests.rig.rigs import bench_with
 
 
-def test_a_bench_on_a_serial_line_says_where_the_loop_runs():
+@pytest.mark.parametrize(("name", "where_it_is"), [("serial", {"port": "/dev/null"}), ("can", {"channel": "can0"})])
+def test_a_bench_on_a_wire_says_where_the_loop_runs(name, where_it_is):
     for where in ("computer", "device", "auto"):
-        daq = make_daq(bench_with({"driver": {"name": "serial", "options": {"port": "/dev/null", "loop": where}}}))
+        daq = make_daq(bench_with({"driver": {"name": name, "options": {**where_it_is, "loop": where}}}))
         assert isinstance(daq, RunsLoops)
         assert daq.loop == where
 
 
-@pytest.mark.parametrize("options", [CanOptions, NiDaqmxOptions, SoundOptions])
+@pytest.mark.parametrize("options", [NiDaqmxOptions, SoundOptions])
 def test_what_cannot_carry_the_loop_does_not_take_the_option(options):
     assert "loop" not in options.model_fields
 

@@ -30,6 +30,15 @@ class LoopingDAQ(VirtualDAQ):
     def loop_latency_samples(self):
         return 0.5 + self.filter_delay_samples
 
+    obstacle = ""
+    """Why the wire does not carry the rows."""
+
+    def why_no_rows(self, block):
+        return self.obstacle
+
+    def why_no_room(self, sizes):
+        return ""
+
     @property
     def counters(self):
         return {"lost_samples": 0}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rig.bench import load_bench
-from rig.campaigns.running.runner import tick_settings
+from rig.campaigns.running.settings import tick_settings
 from rig.drivers.virtual import VirtualDAQ
-from rig.errors import DaqMismatch
+from rig.errors import DaqMismatch, DaqRefused
 from rig.loop.loop import Loop
-from rig.loop.on_device import DeviceLoop, runs_on_device
+from rig.loop.on_device import DeviceLoop, why_on_computer
 from rig.tick.layout import ROW, SAMPLE_LOST
 from rig.tick.tick import Tick
 from rig.wire.messages import ROW_BYTES, Record, State
@@ -143,10 +143,20 @@ def test_pieces_beyond_the_records_are_left_out(device):
 def test_another_loop_is_refused_or_left_alone(digest, named):
     daq = LoopingDAQ(BENCH)
     daq.loop_digest = digest
-    with refused(DaqMismatch, named):
-        runs_on_device(daq)
+    with refused(DaqMismatch, named) as seen:
+        why_on_computer(daq, BLOCK)
     daq.loop = "auto"
-    assert not runs_on_device(daq)
+    assert why_on_computer(daq, BLOCK) in str(seen.value)
+
+
+def test_a_wire_that_does_not_carry_the_rows_goes_before_another_loop():
+    daq = LoopingDAQ(BENCH)
+    assert why_on_computer(daq, BLOCK) == ""
+    daq.loop_digest, daq.obstacle = "", "this wire is slow"
+    with pytest.raises(DaqRefused, match="this wire is slow"):
+        why_on_computer(daq, BLOCK)
+    daq.loop = "auto"
+    assert why_on_computer(daq, BLOCK) == "this wire is slow"
 
 
 def test_a_row_has_the_size_that_the_wire_gives_it():

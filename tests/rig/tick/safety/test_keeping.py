@@ -10,7 +10,7 @@ from hypothesis import example, given, strategies as st
 from controller.kernels import FORCE, PERIOD, VOLTAGE
 from rig.arming.checked_scale import CheckedScale
 from rig.campaigns.plans import load_plan
-from rig.campaigns.running.runner import tick_settings
+from rig.campaigns.running.settings import tick_settings
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
 from rig.tick.safety.expected import expected_record

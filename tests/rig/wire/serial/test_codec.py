@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from rig.errors import DaqRefused
+from rig.wire.loop_payloads import Malformed
 from rig.wire.messages import VERSION, EmergencyStop, Heartbeat, Output, Readback, Request, Samples, Stream
-from rig.wire.serial.codec import Codec, ForeignVersion, Malformed
+from rig.wire.serial.codec import Codec, ForeignVersion
 from tests.refused import refused
 from tests.rig.wire.serial.strategies import messages, same, streams
 

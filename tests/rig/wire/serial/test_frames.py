@@ -7,8 +7,9 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from rig.wire.loop_payloads import LARGEST_PAYLOAD
 from rig.wire.messages import VERSION, Request, Stream
-from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec
+from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame, largest_frame, payload_of as product_payload_of
 from tests.docs.wire import on_the_line, payload_of
 from tests.rig.wire.serial.strategies import messages, same
