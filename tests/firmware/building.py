@@ -54,8 +54,8 @@ def built_tick(target: str) -> Path:
     return made_once(shared_folder() / f"tick-{target}", lambda folder: build_tick(target, folder) and None)
 
 
-def built_with_loop(target: str) -> Path:
-    """The program of a target with the compiled tick linked in, built once.
+def built_with_loop(target: str, room: int | None = None) -> Path:
+    """The program of a target with the compiled tick linked in, built once; ``room``: bytes for the records of a run.
 
     ``host``, ``host-sanitized`` and ``script`` are for this computer, those of `LOOP_BOARDS` for a Cortex-M7. Skips or fails as
     `need` does, also where the tick cannot be compiled.
@@ -63,9 +63,9 @@ def built_with_loop(target: str) -> Path:
     of_arm = target in LOOP_BOARDS
     need(*(NEEDS["mps2-an386"] if of_arm else HOSTS))
     tick = built_tick("cortex-m7" if of_arm else "host")
-    folder = made_once(
-        shared_folder() / "firmware" / f"{target}-with-loop", lambda folder: _make(target, folder, f"TICK={tick}")
-    )
+    name = f"{target}-with-loop" + (f"-{room}" if room else "")
+    variables = [f"TICK={tick}"] + ([f"ROOM={room}"] if room else [])
+    folder = made_once(shared_folder() / "firmware" / name, lambda folder: _make(target, folder, *variables))
     return folder / (f"{target}.elf" if of_arm else target)
 
 

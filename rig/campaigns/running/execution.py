@@ -15,6 +15,7 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
 from rig.campaigns.evaluation.heavy_damping import with_heavy_damping
 from rig.campaigns.evaluation.images import with_images
+from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.measured_together import Passage, round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
@@ -290,6 +291,7 @@ class Execution:
         ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
         """
         bench, plan, out = self.bench, self.plan, []
+        lost = int(lost_rows(rows).sum())  # a loop on the device knows nothing of those that were lost on the way here
         try:
             if self.kind.measure_batch is not None:
                 points = self.kind.measure_batch(bench, plan, targets, rows, passages, ended)
@@ -306,7 +308,7 @@ class Execution:
             if settling is not None:
                 point = with_force_harmonics(bench, plan, target, point, int(settling["left_alone"]))
             point = with_heavy_damping(point)
-            if refused_for_a_transient(point, bench, rows, faults, steady):
+            if refused_for_a_transient(point, bench, rows, faults + lost, steady):
                 self.passing.add(point.number)
             point = with_images(bench, point, self.images, damping=self.kind.asks_for_damping)
             out.append(replace(point, rows=where))

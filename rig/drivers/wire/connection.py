@@ -3,6 +3,7 @@
 import contextlib
 import math
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -84,15 +85,20 @@ class Connection:
         self.latched = self.cleared = NOTHING
         """``latched``: what had latched when the device was met and is not cleared yet; ``cleared``: what was cleared."""
 
-    def meet(self, bench: Bench, queue: int) -> None:
-        """Find the device. Refuse it if it is not the one the bench describes, or if the wire cannot carry its stream."""
+    def meet(self, bench: Bench, queue: int, loop: Literal["computer", "device", "auto"] = "computer") -> None:
+        """Find the device. Refuse it if it is not the one the bench describes, or if the wire cannot carry its stream.
+
+        Where the device is to run the ``loop``, the stream is another one, which is checked with its plan.
+        """
         self._find()
-        bits = self._agree(bench, VERSION).bits
-        stream = Stream(len(bench.channels), bench.block, bench.sample_rate_hz, bits, queue)
+        facts = self._agree(bench, VERSION)
+        stream = Stream(len(bench.channels), bench.block, bench.sample_rate_hz, facts.bits, queue)
         try:
-            self.check_capacity(stream)
+            if loop != "device":
+                self.check_capacity(stream)
         except DaqRefused as refused:
-            self._do_without_readbacks(bench, stream, refused)
+            if loop == "computer" or not facts.loop_digest:
+                self._do_without_readbacks(bench, stream, refused)
         for number in range(OPENING_PINGS):
             began = self.clock()
             self.dialogue.ask(Command.GET, Parameter.PING, number)

@@ -204,7 +204,7 @@ class WireDAQ(DAQ):
         try:
             connection.link.open()
             self._connection, self._streaming = connection, None
-            connection.meet(self._bench, self._options.queue)
+            connection.meet(self._bench, self._options.queue, self.loop)
         except BaseException:
             connection.let_go()  # also a port whose adapter did not answer
             raise

@@ -47,12 +47,14 @@ REASONS = {
 def why_no_rows(connection: Connection, n_channels: int, rate_hz: float, block: int) -> str:
     """Why the wire does not carry the rows of a loop on the device, with the sum; empty if it does."""
     assert connection.facts is not None
+    stream = _stream(n_channels, block, rate_hz, connection.facts.bits)
+    if why := connection.link.why_no_rows(stream):
+        return why
     if connection.lacks_room:
         return (
             f"{connection.link.name}: the wire has no room for version 2 of the protocol, of which the loop is a part"
         )
-    stream = _stream(n_channels, block, rate_hz, connection.facts.bits)
-    return connection.link.why_no_rows(stream) or connection.why_not_carried(stream)
+    return connection.why_not_carried(stream)
 
 
 def _stream(n_channels: int, block: int, rate_hz: float, bits: int) -> Stream:

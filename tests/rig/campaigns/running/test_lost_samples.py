@@ -14,8 +14,9 @@ from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import RecordingError
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
+from rig.loop.loop import Loop
 from rig.measurements import point_rows
-from rig.tick.layout import recorded_row
+from rig.tick.layout import SAMPLE_LOST, recorded_row
 from rig.tick.safety.layout import EndReason
 from tests.refused import refused
 from tests.rig.campaigns.running.test_runs import plan_with
@@ -256,3 +257,34 @@ def _options(path) -> dict:
 
     bench: Bench = load_bench(path)
     return bench.driver.options
+
+
+class LosingRows(Loop):
+    """A loop that has lost nothing; the rows of its first run are lost on the way to the campaign, as of a loop on a device."""
+
+    gap = slice(0)
+    runs = 0
+
+    def run(self):
+        LosingRows.runs += 1
+        first, is_first = 0, LosingRows.runs == 1
+        for rows in super().run():
+            begin, end = (min(max(at - first, 0), rows.size) for at in (self.gap.start, self.gap.stop))
+            if is_first and end > begin:
+                rows["inputs"][begin:end] = np.nan
+                rows["flags"][begin:end] |= SAMPLE_LOST
+            first += rows.size
+            yield rows
+
+
+def test_a_point_whose_rows_were_lost_on_the_way_from_the_device_is_measured_again(monkeypatch, whole):
+    point = whole[1]
+    LosingRows.gap, LosingRows.runs = slice(point["first_sample"], point["end_sample"]), 0
+    monkeypatch.setattr("rig.loop.session.Loop", LosingRows)
+    with rig.run(plan_with(**PLAN), seed=1) as run:
+        assert run.complete
+        assert LosingRows.runs == len(run.recording.parts) == 2
+        again = run.recording.points[-1]
+        assert again["accepted"]
+        assert "were lost" in again["refused_before"][0]["reason"]
+        assert again["frequency_hz"] == pytest.approx(whole[1]["frequency_hz"], rel=1e-4)
