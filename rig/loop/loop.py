@@ -67,6 +67,8 @@ class Loop(DrivenLoop):
         super().__init__(daq, tick)
         self.paced = paced
         self.notes: tuple[str, ...] = ()
+        self.chunk_s = PACED_CHUNK_S if paced or daq.capabilities.paced else CHUNK_S
+        """Length of the chunks of telemetry, s; a request to stop acts where one ends."""
         self.statistics = LoopStatistics(daq.sample_rate_hz)
         self._fused = daq if fused and isinstance(daq, FusedDAQ) else None
 
@@ -156,14 +158,13 @@ class Loop(DrivenLoop):
         return self.failure is not None or self.tick.over
 
     def _chunk_samples(self) -> int:
-        """Return the size of the next chunk: up to the end of the present 0.5 s, or 0.02 s if a clock paces the loop.
+        """Return the size of the next chunk: up to the end of the present ``chunk_s``.
 
         A start that is judged comes in chunks of a period, up to the block in which a judgement is due: it lasts no longer than
         that needs.
         """
-        seconds = PACED_CHUNK_S if self.paced or self.daq.capabilities.paced else CHUNK_S
         block = self.daq.block
-        whole = max(1, round(seconds * self.daq.sample_rate_hz / block))
+        whole = max(1, round(self.chunk_s * self.daq.sample_rate_hz / block))
         blocks = whole - self.statistics.samples // block % whole
         if self.tick.start_held:
             period = self.daq.sample_rate_hz / self.tick.frequency_hz / block
