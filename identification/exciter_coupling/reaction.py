@@ -120,7 +120,9 @@ class Reaction:
 
     def response(self, loop: Loop, frequency_hz: Float) -> Complex:
         """complex[n]: frequency response P^ of a filter."""
-        return np.asarray(self._each(loop.a, loop.b, frequency_hz) @ np.append(loop.c, loop.d))
+        z = np.exp(2j * np.pi * frequency_hz / self.sample_rate_hz)
+        filter_ = StateSpace(loop.a, loop.b[:, None], loop.c[None], np.array([[loop.d]]))
+        return np.asarray(filter_.response(z)[:, 0, 0])
 
     def _each(self, a: Float, b: Float, frequency_hz: Float) -> Complex:
         """complex[n, n_xi + 1]: responses of the filter's states to the output, and 1 for its direct term."""

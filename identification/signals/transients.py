@@ -25,7 +25,7 @@ _MIN_SAMPLES_PER_PERIOD = 8.0
 """Fewest samples in the shortest period. Chosen: harmonics up to the third stay below half the rate."""
 _POINTS_PER_PERIOD = 16
 """Values that are returned in the shortest period, where their spacing is not given. Chosen."""
-_STRETCH = 65536  # samples that are demodulated at once
+_STRETCH = 65536  # samples of all channels that are demodulated at once
 _MARGIN = 64  # samples beyond a stretch that its splines include
 
 
@@ -131,7 +131,7 @@ def demodulate(
         channels=tuple(channels),
         time_s=at / rate_hz,
         frequency_hz=advance / half * rate_hz / (4.0 * np.pi),
-        fundamentals=np.array([_fundamental(theta, row, at, reach) for row in data]),
+        fundamentals=_fundamentals(theta, data, at, reach),
         window_periods=2 * periods,
     )
 
@@ -158,24 +158,26 @@ def _whole_windows(theta: Float, known: slice, reach: float) -> slice:
     return slice(first, end)
 
 
-def _fundamental(theta: Float, signal: Float, at: NDArray[np.intp], reach: float) -> Complex:
-    """complex[len(at)]: fundamental of ``signal`` at the samples ``at``, stretch by stretch.
+def _fundamentals(theta: Float, signals: Float, at: NDArray[np.intp], reach: float) -> Complex:
+    """complex[n_channels, len(at)]: fundamentals of ``signals`` at the samples ``at``, stretch by stretch.
 
-    The splines of a whole record would take half a kilobyte per sample; the effect of a cut on them decays by 0.27 per
-    sample.
+    The splines of a whole record would take half a kilobyte per sample and channel; the effect of a cut on them decays by 0.27
+    per sample. All channels have the nodes of their splines in common.
     """
-    out = np.empty(at.size, np.complex128)
-    step = max(1, _STRETCH // max(1, int(at[1] - at[0]))) if at.size > 1 else 1
+    out = np.empty((signals.shape[0], at.size), np.complex128)
+    most = _STRETCH // signals.shape[0]
+    step = max(1, most // max(1, int(at[1] - at[0]))) if at.size > 1 else 1
     for first in range(0, at.size, step):
         some = at[first : first + step]
         start = max(0, int(np.searchsorted(theta, theta[some[0]] - 2.0 * reach)) - _MARGIN)
         stop = int(np.searchsorted(theta, theta[some[-1]] + 2.0 * reach)) + _MARGIN
-        out[first : first + step] = _of_stretch(theta[start:stop], signal[start:stop], some - start, reach)
+        part = signals[:, start:stop].T.astype(np.float64)
+        out[:, first : first + step] = _of_stretch(theta[start:stop], part, some - start, reach).T
     return out
 
 
-def _of_stretch(theta: Float, signal: Float, at: NDArray[np.intp], reach: float) -> Complex:
-    """complex[len(at)]: fundamental of a stretch of a signal.
+def _of_stretch(theta: Float, signals: Float, at: NDArray[np.intp], reach: float) -> Complex:
+    """complex[len(at), n_channels]: fundamentals of a stretch of signals, float[n, n_channels].
 
     A mean is a difference of the antiderivative of an interpolating spline. Windows end between samples, because a period is
     seldom a whole number of samples.
@@ -183,7 +185,7 @@ def _of_stretch(theta: Float, signal: Float, at: NDArray[np.intp], reach: float)
     from scipy.interpolate import CubicSpline  # a third of a second, for sweeps alone
 
     once = _whole_windows(theta, slice(0, theta.size), reach)
-    integral = CubicSpline(theta, 2.0 * np.exp(-1j * theta) * signal).antiderivative()
+    integral = CubicSpline(theta, 2.0 * np.exp(-1j * theta)[:, None] * signals).antiderivative()
     mean = (integral(theta[once] + reach) - integral(theta[once] - reach)) / (2.0 * reach)
     again = CubicSpline(theta[once], mean).antiderivative()
     return np.asarray((again(theta[at] + reach) - again(theta[at] - reach)) / (2.0 * reach))

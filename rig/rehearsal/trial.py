@@ -23,8 +23,8 @@ from vibrolock.described import Described
 FURTHER_PART = 1 << 32
 """Difference between the seeds of the parts of a run, so that each has other noise; chosen: above all numbers of draws."""
 CHUNK_S = 2.5
-"""Chunks of a twin's rows, s. A run that its campaign stops ends up to that much later than a run on a virtual rig would; chosen:
-what is done once a chunk then costs 3 % of a twin in place of 10 %."""
+"""Chunks of a twin's rows, s: a run that its campaign stops ends up to that much later. Chosen: what is done once a chunk costs
+2 % of a twin; with the loop's own chunks it would be 10 %."""
 REFUSED = "REFUSED"
 """End of a trial whose plan the bench refuses before anything moves."""
 NOT_COMPUTED = "NOT_COMPUTED"

@@ -68,3 +68,13 @@ def test_what_cannot_be_is_named() -> None:
         subspace(responses, 4, sample_rate_hz=1000.0, block_rows=2)
     with refused(IdentificationError, "lines-are-too-few-for-block-2", field="frequency_hz"):
         subspace(responses, 20, sample_rate_hz=1000.0)
+
+
+def test_a_response_at_many_points_is_that_at_few() -> None:
+    random = np.random.default_rng(5)
+    a = 0.3 * random.normal(size=(6, 6))
+    a[4:, 4:] = np.eye(2, k=-1)  # delays, whose eigenvectors are parallel
+    model = StateSpace(a, random.normal(size=(6, 2)), random.normal(size=(3, 6)), random.normal(size=(3, 2)))
+    z = np.exp(1j * np.linspace(0.0, 3.0, 6000))
+    few = np.concatenate([model.response(part) for part in np.array_split(z, 4)])
+    assert np.max(np.abs(model.response(z) - few)) < 1e-12 * np.max(np.abs(few))
