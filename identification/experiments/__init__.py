@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         EXPLAINED as EXPLAINED,
         lacks_something as lacks_something,
         residual_over_noise as residual_over_noise,
+        unsettled as unsettled,
     )
     from identification.experiments.simulators import Simulator as Simulator
     from identification.experiments.time_experiments import suitable_rate_hz as suitable_rate_hz

@@ -1,5 +1,6 @@
 """What noise explains of the residual of a model."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,10 @@ EXPLAINED = 3.0
 SMALL = 2e-3
 """Relative error up to which a residual is called small. Chosen: every law that fits the virtual magnet beam leaves 0.08 %."""
 
+UNSETTLED = 0.05
+"""Standard error of the mean over periods, over the output, from which on a record is no settled vibration. Chosen: noise of
+3 % has less, and a hardening structure that jumps from period to period 8 to 40 %."""
+
 
 def lacks_something(over_noise: ArrayLike, error: ArrayLike) -> Bool:
     """Return whether a model lacks something or its fit ended in a local minimum, bool[n]: more than noise, and not small.
@@ -29,6 +34,32 @@ def lacks_something(over_noise: ArrayLike, error: ArrayLike) -> Bool:
     ``over_noise`` is that of `residual_over_noise`, False where it is NaN; ``error`` is the relative RMS error, float[n].
     """
     return np.asarray((np.asarray(over_noise) > EXPLAINED) & (np.asarray(error) > SMALL))
+
+
+def unsettled_share(experiment: Experiment) -> float:
+    """Return the largest standard error of the mean over periods, over the output, in the excited lines; NaN if unknown.
+
+    What force and output share does not count. Above `UNSETTLED` the periods differ by so much that their mean is no vibration
+    of the structure: it has not settled, or does not repeat. A right model of it leaves any residual.
+    """
+    measured = experiment.counted_outputs
+    noise = residual_and_noise(experiment, measured).noise
+    if not np.isfinite(noise).all():
+        return float("nan")
+    y = _lines(measured, experiment)
+    size = np.sum(np.abs(y[:, _in_band(experiment, y.shape[1])]) ** 2, axis=1)
+    return float(np.sqrt(np.max(np.divide(noise, size, out=np.zeros(len(y)), where=size > 0.0))))
+
+
+def unsettled(experiments: Iterable[Experiment]) -> tuple[str, ...]:
+    """Return a remark on each record whose periods differ too much for its mean to be a vibration (`unsettled_share`)."""
+    shares = [(one, unsettled_share(one)) for one in experiments]
+    return tuple(
+        f"{one.name}: the mean of its periods is known within {100.0 * share:.2g} % only: the vibration has not settled, does "
+        "not repeat, or is buried in noise; whether the model is right cannot be told"
+        for one, share in shares
+        if share > UNSETTLED
+    )
 
 
 class ResidualAndNoise(NamedTuple):

@@ -440,14 +440,18 @@ class Iwan(Joint):
     """Exponent of the density."""
     beta: float = 0.1
     """Stiffness of the end slider over that of the density."""
-    count: int = 12
+    count: int = 20
     """Number of sliders of the density."""
-    smallest: float = 0.02
-    """Displacement below which nothing slips, over ``slip``."""
+    smallest: float = 0.0
+    """Displacement below which nothing slips, over ``slip``, with slips above it in equal ratios. 0: slips grow with the square
+    of their number. Most of the stiffness slips late, where equal ratios are coarse: fits of a joint of 40 sliders left four to
+    nine times a noise of 0.1 % with 12 or 24 of them, and one to two with these 20."""
 
     def sliders(self) -> Float:
         """float[2, count + 1]: stiffness and largest force; exact in stuck stiffness and force at full slip."""
-        edges = np.concatenate([[0.0], np.geomspace(self.smallest, 1.0, self.count)])
+        edges = (np.arange(self.count + 1) / self.count) ** 2
+        if self.smallest > 0.0:
+            edges = np.concatenate([[0.0], np.geomspace(self.smallest, 1.0, self.count)])
         stiffness, slip = iwan_sliders(self.stiffness_n, self.chi, self.beta, edges)
         return np.array([stiffness, stiffness * self.slip * slip])
 

@@ -9,7 +9,7 @@ import numpy as np
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
-from identification.experiments.residuals import lacks_something, residual_over_noise
+from identification.experiments.residuals import lacks_something, residual_over_noise, unsettled
 from identification.fitting.levenberg_marquardt import Minimum
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
@@ -58,7 +58,12 @@ class Fitted(NamedTuple):
     iterations: int
 
     def lacks_something(self) -> bool:
-        """Whether the residual of any experiment is more than noise and not small (`lacks_something`)."""
+        """Whether the residual of any experiment is more than noise and not small (`lacks_something`).
+
+        False where one has not settled (`unsettled`): it also moves the residuals of the others.
+        """
+        if unsettled(self.problem.experiments):
+            return False
         for experiment in self.problem.experiments:
             simulated = self.model.simulate_experiment(experiment).outputs[:, experiment.counted_from :]
             measured = experiment.counted_outputs
@@ -224,7 +229,7 @@ def _fitted(
             else None
             for e, count in zip(settled, lengths, strict=True)
         ]
-        parameters = Parameters(begun, tied, free, turned, poles, measured)
+        parameters = Parameters(begun, tied, free, turned, poles if turned else measured, measured)
         problem = Problem(parameters, settled, nudgings, ModalTest(parameters, modes, linear), misfit, watch)
         end = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found = parameters.model(end.vector)

@@ -12,6 +12,8 @@ from identification.experiments.residuals import (
     log_likelihood_ratio,
     residual_and_noise,
     residual_over_noise,
+    unsettled,
+    unsettled_share,
 )
 from tests.refused import refused
 
@@ -169,3 +171,16 @@ def test_a_covariance_of_another_shape_is_refused():
     one = _experiment(_periods(np.random.default_rng(8)))
     with refused(IdentificationError, field="noise_covariance", allowed="499, 3, 3"):
         replace(one, noise_covariance=np.zeros((3, 3), complex))
+
+
+def test_periods_that_differ_too_much_are_no_settled_vibration():
+    """Periods of the outputs that change in size: their mean is known within the standard error of the factors."""
+    periods = _periods(np.random.default_rng(3))
+    factors = np.array([1.0, 1.3, 0.6, 1.1, 0.9, 1.2])
+    changing = _experiment(periods * np.array([np.ones(PERIODS), factors, factors])[:, :, None])
+    known = np.std(factors, ddof=1) / np.sqrt(PERIODS) / np.mean(factors)
+    assert unsettled_share(changing) == pytest.approx(known, rel=1e-6)
+    (said,) = unsettled([_experiment(periods), replace(changing, name="loud")])
+    assert said.startswith("loud: the mean of its periods is known within")
+    assert not unsettled([_experiment(_periods(np.random.default_rng(4), shaken=0.2, force=0.01, outputs=0.05))])
+    assert np.isnan(unsettled_share(replace(changing, noise_covariance=None)))
