@@ -12,7 +12,7 @@ number of rigs if results are small and consumed as they arrive.
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import partial
 from typing import TypeVar
 
@@ -36,7 +36,7 @@ def ensemble(
     *,
     n_jobs: int | None = None,
     forks: bool = False,
-) -> Iterator[tuple[str, Result]]:
+) -> Generator[tuple[str, Result], None, None]:
     """Yield ``(name, function(variant))`` for every variant, in their order, as results arrive.
 
     Raises `VariantError`, naming the variant, if the function fails. After such an error, after Ctrl-C, or if the iterator is

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_responses
@@ -46,7 +45,9 @@ class StateSpace(NamedTuple):
 
     def _response_at_many(self, z: Complex) -> Complex:
         """The same by back substitution in the triangle of A (Schur), for all points at once."""
-        triangle, basis = scipy.linalg.schur(self.a, output="complex")
+        from scipy.linalg import schur  # where there are so many alone
+
+        triangle, basis = schur(self.a, output="complex")
         n, inputs = self.b.shape
         driven, c = basis.conj().T @ self.b, self.c @ basis
         states = np.empty((n, inputs, z.size), np.complex128)

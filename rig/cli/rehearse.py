@@ -34,6 +34,9 @@ def rehearse_(
     exact: Annotated[bool, typer.Option("--exact", help="A virtual bench is its own twin, with other seeds.")] = False,
     hypotheses: Annotated[Path | None, typer.Option(help="TOML table of what is assumed of the rest.")] = None,
     draws: Annotated[int, typer.Option("-n", "--draws", help="Number of twins.", min=1)] = 200,
+    until_certain: Annotated[
+        bool, typer.Option("--until-certain", help="End as soon as it is certain whether the plan ends well.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the draws.", min=0)] = 0,
     improve: Annotated[
         Path | None, typer.Option(metavar="PLAN", help="Try what would help; write the changed plan.")
@@ -69,7 +72,7 @@ def rehearse_(
     if twin is not None:
         _write_twin(subject, twin, output, overwrite)
         return
-    _rehearse(subject, output, improve, figure, overwrite=overwrite, jobs=jobs, json=json)
+    _rehearse(subject, output, improve, figure, overwrite=overwrite, until_certain=until_certain, jobs=jobs, json=json)
 
 
 def _write_twin(subject: "Subject", number: int, output: Path, overwrite: bool) -> None:
@@ -91,6 +94,7 @@ def _rehearse(
     figure: Path | None,
     *,
     overwrite: bool,
+    until_certain: bool,
     jobs: int,
     json: bool,
 ) -> None:
@@ -121,7 +125,9 @@ def _rehearse(
         request = request_for(subject)
     usual = expected_duration(request, jobs)
     with Rehearsing(subject.draws, usual) as listener:
-        found = rehearse_into(request, output, overwrite=overwrite, listener=listener, jobs=jobs)
+        found = rehearse_into(
+            request, output, overwrite=overwrite, until_certain=until_certain, listener=listener, jobs=jobs
+        )
     second = None
     if improve is not None:
         with Rehearsing(subject.draws, usual) as listener:

@@ -40,7 +40,13 @@ def tune_(
     ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf, .svg or .html.")] = None,
     rehearse: Annotated[
-        int, typer.Option(metavar="N", help="Twins on which the plan is rehearsed; 0 for none.", min=0, max=100_000)
+        int,
+        typer.Option(
+            metavar="N",
+            help="Twins on which the plan is rehearsed, fewer once the verdict is certain; 0: none.",
+            min=0,
+            max=100_000,
+        ),
     ] = 40,
     options: "RunOptions",
     json: Json = False,
@@ -106,7 +112,9 @@ def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, dr
     with Waiting("learning what is known of the rig"):
         request = request_for(subject)
     with Rehearsing(draws, expected_duration(request, jobs=-1)) as listener:
-        facts = summary(rehearse_into(request, rehearsed, overwrite=True, listener=listener, jobs=-1))
+        facts = summary(
+            rehearse_into(request, rehearsed, overwrite=True, until_certain=True, listener=listener, jobs=-1)
+        )
     head = wrap(f"Rehearsal: {verdict_in_one_line(facts)}.", 118, initial_indent="# ", subsequent_indent="# ")
     with whole_file(plan) as part:
         part.write_text("\n".join([*head, found.plan_toml]), encoding="utf-8")

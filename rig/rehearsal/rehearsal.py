@@ -3,8 +3,8 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing, suppress
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +18,7 @@ from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
+from rig.rehearsal.sequential import is_certain
 from rig.rehearsal.trial import Trial, not_computed, run_trial
 from rig.rehearsal.truth import NOT_BALANCED, TrueBackbone, true_backbone
 from rig.rehearsal.twins import Twin, draw_twin
@@ -206,6 +207,8 @@ class Rehearsal(Result):
     """When it was finished, ISO 8601."""
     tried: tuple[Effect, ...] = ()
     """Remedies that were tried on its twins."""
+    at_most: int | None = None
+    """Number of twins that were asked for, of a rehearsal that ends once it is certain (`rig.rehearsal.sequential`)."""
 
     @property
     def digest(self) -> str:
@@ -241,6 +244,7 @@ def rehearse(
     journal: Path | None = None,
     *,
     begin_anew: bool = False,
+    until_certain: bool = False,
     progress: Callable[[Draw, int], None] = lambda _draw, _done: None,
     jobs: int | None = None,
 ) -> Rehearsal:
@@ -254,6 +258,9 @@ def rehearse(
         File to which every draw is appended. A journal of the same rehearsal is resumed; the caller removes it.
     begin_anew
         Whether a journal of another rehearsal is replaced rather than refused.
+    until_certain
+        Whether draws end as soon as it is certain whether the plan ends well (`rig.rehearsal.sequential`), rather than all of
+        the request being made.
     progress
         Is called with each draw and the number of draws that are done.
     jobs
@@ -270,15 +277,32 @@ def rehearse(
     for count, draw in enumerate(done.values(), 1):
         progress(draw, count)
     missing = [number for number in range(request.draws) if number not in done]
-    for _, draw in ensemble({str(number): number for number in missing}, request, n_jobs=jobs, forks=True):
-        done[draw.number] = draw
-        if journal is not None:
-            _append(journal, asdict(draw))
-        progress(draw, len(done))
-    draws = tuple(done[number] for number in range(request.draws))
+    results = ensemble({str(number): number for number in missing}, request, n_jobs=jobs, forks=True)
+    draws: list[Draw] = []
+    with closing(results):
+        for number in range(request.draws):
+            if number not in done:
+                _, draw = next(results)
+                done[number] = draw
+                if journal is not None:
+                    _append(journal, asdict(draw))
+                progress(draw, len(done))
+            draws.append(done[number])
+            if until_certain and is_certain(*_ended_well(draws)):
+                break
     if not any(draw.trial.computed for draw in draws):
         raise ConfigurationError(f"none of {len(draws)} twins could be computed: {draws[0].trial.text}")
-    return Rehearsal(facts=request.facts, draws=draws, finished=datetime.now(UTC).isoformat(timespec="seconds"))
+    return Rehearsal(
+        facts=request.facts,
+        draws=tuple(draws),
+        finished=datetime.now(UTC).isoformat(timespec="seconds"),
+        at_most=request.draws if until_certain else None,
+    )
+
+
+def _ended_well(draws: Sequence[Draw]) -> tuple[int, int]:
+    """Number of draws that ended well, and of those that could be computed."""
+    return sum(draw.trial.completed for draw in draws), sum(draw.trial.computed for draw in draws)
 
 
 def _completed_draws(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[int, Draw]:

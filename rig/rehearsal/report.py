@@ -5,13 +5,13 @@ import math
 from pydantic import JsonValue
 
 from rig.rehearsal.rehearsal import Effect, Rehearsal
+from rig.rehearsal.sequential import GOOD
 from rig.rehearsal.verdict import Proportion, Statistic, Verdict, verdict_of
 from rig.text.levels import in_shown_unit, level_text
 
 MAX_LIMITS, MAX_REASONS, MAX_INFLUENCES = 5, 3, 6
 """Limits, reasons of one refusal, and influences that are printed; chosen: the page fits on a screen."""
 RELIABLE_MISSING = 0.05  # proportion of twins that could not be computed above which the verdict is unreliable; chosen
-GOOD_ENDS_WELL = 0.9  # proportion of twins on which a plan ends well above which no advice is given; chosen
 LEVEL_UNITS = {"levels_v": "V", "levels_n": "N", "levels_rms_n": "N RMS", "levels_m": "m"}
 """Unit of a plan's levels, by the key that gives them."""
 
@@ -25,6 +25,7 @@ class Summary(Statistic):
     plan_kind: str
     level_unit: str
     draws: int
+    at_most: int | None = None
     exact: bool
     sources: tuple[str, ...]
     determined: float | None
@@ -49,6 +50,7 @@ def summary(rehearsal: Rehearsal) -> Summary:
         plan_kind=facts.plan_kind,
         level_unit=next((unit for key, unit in LEVEL_UNITS.items() if facts.plan.get(key) is not None), "V"),
         draws=len(rehearsal.draws),
+        at_most=rehearsal.at_most,
         exact=facts.hypotheses is None,
         sources=facts.sources,
         determined=facts.determined,
@@ -67,14 +69,19 @@ def verdict_in_one_line(found: Summary) -> str:
     """Return how probably the plan ends well and trips, on how many twins, and what to do if that is not enough."""
     well, trips = found.verdict.ends_well, found.verdict.trips
     out = (
-        f"on {found.draws} twins of what was measured, by the default hypotheses, it ends well in {_proportion(well)} and "
+        f"on {_number(found)} twins of what was measured, by the default hypotheses, it ends well in {_proportion(well)} and "
         f"trips in {_proportion(trips)}"
     )
     if missing := not_computed_in_one_line(found.verdict):
         out += f"; {missing}"
-    if well.value < GOOD_ENDS_WELL or trips.count:
+    if well.value < GOOD or trips.count:
         out += "; rig rehearse --improve tries what would help"
     return out
+
+
+def _number(found: Summary) -> str:
+    early = found.at_most is not None and found.draws < found.at_most
+    return f"{found.draws} of at most {found.at_most}" if early else str(found.draws)
 
 
 def not_computed_in_one_line(verdict: Verdict) -> str:
@@ -94,7 +101,7 @@ def lines(found: Summary) -> list[str]:
     verdict = found.verdict
     twins = "seeds of the virtual bench itself" if found.exact else "twins"
     out = [
-        f"{found.specimen} (bench {found.bench}): {found.plan}, rehearsed on {found.draws} {twins}",
+        f"{found.specimen} (bench {found.bench}): {found.plan}, rehearsed on {_number(found)} {twins}",
         *(f"known from      {source}" for source in found.sources),
         *(f"not computed    {text}" for text in (not_computed_in_one_line(verdict),) if text),
         f"ends well       {_proportion(verdict.ends_well)}",

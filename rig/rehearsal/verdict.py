@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializerFunction
 
 from rig.rehearsal.forecast import QUANTITIES
 from rig.rehearsal.rehearsal import Draw, Rehearsal
+from rig.rehearsal.sequential import interval, unbiased
 from vibrolock.arrays import Float
 
 NORMAL_975 = 1.959963984540054
@@ -30,10 +31,17 @@ class Proportion(Statistic):
     """Number of draws in which it happened."""
     of: int
     """Number of draws."""
+    stopped: bool = False
+    """Whether the draws ended by what they showed: the interval is then one that holds all the same
+    (`rig.rehearsal.sequential`)."""
+    without_bias: float | None = None
+    """The estimate where draws that ended by what they showed bias the share of them."""
 
     @property
     def value(self) -> float:
         """The estimate; NaN without draws."""
+        if self.without_bias is not None:
+            return self.without_bias
         return self.count / self.of if self.of else float("nan")
 
     @property
@@ -41,6 +49,8 @@ class Proportion(Statistic):
         """Lower and upper end."""
         if not self.of:
             return 0.0, 1.0
+        if self.stopped:
+            return interval(self.count, self.of)
         n, k, square = self.of, self.count, NORMAL_975**2
         middle, half = k + 0.5 * square, NORMAL_975 * math.sqrt(k * (n - k) / n + 0.25 * square)
         low, high = (middle - half) / (n + square), (middle + half) / (n + square)
@@ -172,7 +182,8 @@ class Verdict(Statistic):
     def trips_at_most(self) -> float:
         """Upper end of the 95 % interval of a trip's probability, if each twin that could not be computed trips."""
         missing = self.not_computed.count
-        return Proportion(count=self.trips.count + missing, of=self.trips.of + missing).interval[1]
+        trips = self.trips
+        return Proportion(count=trips.count + missing, of=trips.of + missing, stopped=trips.stopped).interval[1]
 
 
 def verdict_of(rehearsal: Rehearsal) -> Verdict:
@@ -181,15 +192,23 @@ def verdict_of(rehearsal: Rehearsal) -> Verdict:
     missing = [draw.trial.text for draw in rehearsal.draws if not draw.trial.computed]
     n = len(draws)
     errors = [_errors(draw) for draw in draws]
+    stopped = rehearsal.at_most is not None
+    well, tripped, lost = (
+        sum(getattr(draw.trial, name) for draw in draws) for name in ("completed", "tripped", "lost_lock")
+    )
+    estimates: tuple[float | None, float | None] = (None, None)
+    if stopped and n:
+        estimate = unbiased(well, n)
+        estimates = estimate, (1.0 - estimate) * tripped / (n - well) if tripped else 0.0
     levels = {point.number: point.level for draw in draws for point in draw.trial.points}
     limits = {name for draw in draws for name in draw.trial.shares}
     margins = {name: Quantiles.of(d.trial.shares[name] for d in draws if name in d.trial.shares) for name in limits}
     return Verdict(
         not_computed=Proportion(count=len(missing), of=len(rehearsal.draws)),
         why_not_computed=dict(Counter(map(without_numbers, missing)).most_common()),
-        ends_well=Proportion(count=sum(d.trial.completed for d in draws), of=n),
-        trips=Proportion(count=sum(d.trial.tripped for d in draws), of=n),
-        lost_lock=Proportion(count=sum(d.trial.lost_lock for d in draws), of=n),
+        ends_well=Proportion(count=well, of=n, stopped=stopped, without_bias=estimates[0]),
+        trips=Proportion(count=tripped, of=n, stopped=stopped, without_bias=estimates[1]),
+        lost_lock=Proportion(count=lost, of=n, stopped=stopped),
         ways_to_trip=_ways(draws),
         points=tuple(_point(number, levels[number], draws) for number in sorted(levels)),
         duration_s=Quantiles.of(d.trial.duration_s for d in draws),

@@ -103,10 +103,13 @@ def rehearse_into(
     output: Path,
     *,
     overwrite: bool = False,
+    until_certain: bool = False,
     listener: Listener | None = None,
     jobs: int | None = None,
 ) -> Rehearsal:
     """Rehearse and write the file ``output``; a rehearsal that was interrupted is taken up again.
+
+    ``until_certain``: draws end as soon as it is certain whether the plan ends well.
 
     Raises `RecordingError` if the file exists and must stay, or cannot be written; the draws so far are then kept.
     """
@@ -118,7 +121,9 @@ def rehearse_into(
     journal = draws_path(output)
     if overwrite and output.exists():
         discard_draws(journal)
-    found = rehearse(request, journal, begin_anew=overwrite, progress=listener.draw, jobs=jobs)
+    found = rehearse(
+        request, journal, begin_anew=overwrite, until_certain=until_certain, progress=listener.draw, jobs=jobs
+    )
     save(found, output)
     journal.unlink(missing_ok=True)
     return found

@@ -48,6 +48,7 @@ def _pack(rehearsal: Rehearsal) -> tuple[Arrays, Attributes]:
         "unknowns": unknowns,
         "limits": limits,
         "tried": [asdict(one) for one in rehearsal.tried],
+        "at_most": rehearsal.at_most,
     }
     return arrays, attributes
 
@@ -81,6 +82,7 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> Rehearsal:
         draws=tuple(draws),
         finished=str(attributes["finished"]),
         tried=_TRIED.validate_python(attributes.get("tried", ())),
+        at_most=attributes.get("at_most"),
     )
 
 
