@@ -293,6 +293,7 @@ class Execution:
         bench, plan, out = self.bench, self.plan, []
         lost = int(lost_rows(rows).sum())  # a loop on the device knows nothing of those that were lost on the way here
         try:
+            IdentificationError.raise_if(lost == rows.size, f"all {lost} samples were lost in transmission")
             if self.kind.measure_batch is not None:
                 points = self.kind.measure_batch(bench, plan, targets, rows, passages, ended)
             else:

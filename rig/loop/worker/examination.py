@@ -10,7 +10,9 @@ from rig.daq import Adjustable
 from rig.drivers import make_daq
 from rig.errors import DaqRefused, DaqWatchdog, RigError
 from rig.loop.recommendation import BUSY, REACHED, Recommendation, Settings, complaints, recommend
+from rig.loop.worker.memory import chunk_of
 from rig.loop.worker.pace import pacing_of
+from rig.loop.worker.placement import NO_QUEUE, who_runs
 from rig.loop.worker.probe import Advice, DeviceReport, Settable, Tried, round_trips, timing_of
 from rig.loop.worker.queue_choice import covering_queue, queue_of
 
@@ -33,11 +35,17 @@ def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> Devi
     For ``seconds`` the device has the longest queue and watchdog, so that nothing latches. Then the settings that
     `rig.loop.recommendation` gives are tried, with a longer queue or block if they do not hold; then a higher sample rate; last
     the settings of the bench, unless its watchdog would end that: the report is with these, where they were tried. Nothing is
-    driven, and nothing that has latched is cleared: an examination that has made the watchdog latch ends there.
+    driven, and nothing that has latched is cleared: an examination that has made the watchdog latch ends there. Where the
+    device runs the loop, samples are exchanged in blocks of 20 ms, and there is nothing to recommend.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """
     began = time.monotonic()
+    if _has_loop(bench, seed):
+        facts = round_trips(bench.model_copy(update={"block": chunk_of(bench)}), seed, seconds)
+        if "failure" not in facts:
+            facts |= {"recommendation": _as_it_is(NO_QUEUE)}
+        return facts | {"examined_s": round(time.monotonic() - began, 1)}
     opened, (allowed, now, by_device), refusal = _that_opens(bench, seed)
     if by_device:
         patient = now
@@ -54,15 +62,21 @@ def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> Devi
             facts = _Examination(bench, seed, now, allowed, facts).report(refusal)
         else:
             why = "the device waits for the host: no output is late, and neither queue nor watchdog needs to be changed"
-            told: Advice = {
-                "settings": {},
-                "differs": {},
-                "reasons": {"queue_blocks": why},
-                "tried": [],
-                "bench_lines": [],
-            }
-            facts |= {"recommendation": told}
+            facts |= {"recommendation": _as_it_is(why)}
     return facts | {"examined_s": round(time.monotonic() - began, 1)}
+
+
+def _has_loop(bench: Bench, seed: int) -> bool:
+    """Return whether the device of a bench runs its loop."""
+    if bench.driver.options.get("loop", "computer") == "computer":
+        return False
+    with make_daq(bench, seed) as daq:
+        return who_runs(daq, bench)[0]
+
+
+def _as_it_is(why: str) -> Advice:
+    """Return a recommendation that changes nothing."""
+    return {"settings": {}, "differs": {}, "reasons": {"queue_blocks": why}, "tried": [], "bench_lines": []}
 
 
 def with_settings(bench: Bench, settings: Settings, rate_hz: float) -> Bench:

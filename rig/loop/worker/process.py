@@ -3,7 +3,7 @@
 import select
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import Connection
 from types import FrameType
@@ -14,13 +14,14 @@ import numpy as np
 from rig.bench import Bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
-from rig.errors import ConfigurationError, DaqError, DaqRefused, RigError
-from rig.loop.on_device import ON_DEVICE, DeviceLoop, RunsLoops, why_on_computer
+from rig.errors import ConfigurationError, DaqError, RigError
+from rig.loop.on_device import ON_DEVICE, DeviceLoop, RunsLoops
 from rig.loop.worker.collector import Collector
 from rig.loop.worker.examination import examine_device
 from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import Layout, SharedMemory, chunk_of, packed
 from rig.loop.worker.pace import pacing_of
+from rig.loop.worker.placement import who_runs, why_no_room
 from rig.loop.worker.probe import probe, round_trips
 from rig.loop.worker.queue_choice import DelayBounds, QueueChoice, presumed_latency, queue_of, settle_queue
 from rig.system.privileges import ordinary_scheduling, prepare
@@ -31,7 +32,6 @@ SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
 COLLECTED_S, COLLECTED_CHUNKS = 120.0, 5
 """Rows of a loop on the device that wait for a late campaign at least, s, and chunks that it takes at a time; chosen: nothing
 hurries it, and on a busy computer it may get a twentieth of a processor."""
-SMALLER = 'use fewer points, shorter waveforms, or driver.options.loop = "auto"'
 MEASUREMENTS: dict[str, Callable[..., object]] = {
     "probe": probe,
     "round trips": round_trips,
@@ -79,12 +79,12 @@ def described(error: RigError) -> tuple[tuple[str, ...], str]:
 def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Bench, seed: int, privileged: bool) -> None:
     """Open the driver, and run one loop over it if the campaign says so."""
     with make_daq(bench, seed) as daq:
-        on_device, why = _who_runs(daq, bench)
+        on_device, why = who_runs(daq, bench)
         identity = dict(daq.identity) | ({"loop": "device"} if on_device else {})
         facts.send(("opened", daq.capabilities, identity, daq.latched, daq.remarks, dict(daq.counters)))
         _, of_plan, sizes, may_change = _told(commands)
         if on_device:
-            why = _no_room(daq, sizes, may_change=may_change)
+            why = why_no_room(daq, sizes, may_change=may_change)
         if on_device and not why:
             _serve_on_device(daq, bench, commands, facts, descriptor, privileged)
             return
@@ -117,23 +117,6 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         statistics = {"deadline_us": round(1e-3 * loop.deadline_ns, 1), "real_time": real_time, **daq.statistics}
     failure = None if loop.failure is None else described(loop.failure)
     facts.send(("ended", failure, loop.cause, loop.counters, statistics))
-
-
-def _who_runs(daq: DAQ, bench: Bench) -> tuple[bool, str]:
-    """Return whether the open device runs the loop of a bench, and why not where the bench would have it so."""
-    if not isinstance(daq, RunsLoops) or daq.loop == "computer":
-        return False, ""
-    why = why_on_computer(daq, chunk_of(bench))
-    return not why, why
-
-
-def _no_room(daq: DAQ, sizes: Mapping[str, int], *, may_change: bool) -> str:
-    """Return why the device does not hold a plan's records; raise `DaqRefused` where the computer may not run it instead."""
-    assert isinstance(daq, RunsLoops)
-    why = daq.why_no_room(sizes) if sizes else ""
-    if why and daq.loop != "auto" and not may_change:
-        raise DaqRefused(f"{why}: {SMALLER}")
-    return why
 
 
 def _serve_on_device(

@@ -286,5 +286,5 @@ def test_a_point_whose_rows_were_lost_on_the_way_from_the_device_is_measured_aga
         assert LosingRows.runs == len(run.recording.parts) == 2
         again = run.recording.points[-1]
         assert again["accepted"]
-        assert "were lost" in again["refused_before"][0]["reason"]
+        assert "samples were lost in transmission" in again["refused_before"][0]["reason"]
         assert again["frequency_hz"] == pytest.approx(whole[1]["frequency_hz"], rel=1e-4)

@@ -31,6 +31,7 @@ def examined(monkeypatch):
 
     def make(bench, seed=0):
         options, of_the_wire = dict(bench.driver.options), WireOptions.model_fields
+        options.pop("loop", None)
         wired = WireOptions(**{name: options.pop(name) for name in [*options] if name in of_the_wire})
         driver = bench.driver.model_copy(update={"options": options})
         daq = MemoryDAQ(bench.model_copy(update={"driver": driver}), seed, wired, **made.keys)
@@ -54,6 +55,17 @@ def examined(monkeypatch):
 def late(made, late_s):
     """Of all blocks one in a hundred, and everything after it, is late by ``late_s``."""
     made.keys["faults"] = Faults(late_every=100, late_s=late_s)
+
+
+def test_a_device_that_runs_the_loop_needs_no_queue_and_nothing_is_tried(examined, monkeypatch):
+    monkeypatch.setattr("rig.loop.worker.examination.who_runs", lambda daq, bench: (True, ""))
+    bench = bench_with({"driver": {"name": "serial", "options": {**BENCH.driver.options, "loop": "device"}}})
+    late(examined, 0.05)
+    facts = examine_device(bench, 0)
+    assert facts["block"] == 100
+    assert facts["recommendation"]["settings"] == {}
+    assert "needs no queue" in facts["recommendation"]["reasons"]["queue_blocks"]
+    assert facts["recommendation"]["tried"] == facts["recommendation"]["bench_lines"] == []
 
 
 def test_a_device_on_time_is_left_with_the_settings_of_the_bench(examined):
