@@ -291,8 +291,18 @@ static void send_raw(void)
         send_raw_payload();
 }
 
+#ifdef VL_HAS_TICK
+#include "fuzz_loop.h"
+#endif
+
 static void act(uint8_t kind)
 {
+#ifdef VL_HAS_TICK
+    if (kind & 0x40) {
+        act_with_loop();
+        return;
+    }
+#endif
     switch (kind % 16) {
     case 0:
     case 1:
@@ -337,6 +347,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *input, size_t n)
     end = input + n;
     uint8_t what = byte();
     n_channels = byte() % 32;
+#ifdef VL_HAS_TICK
+    n_channels = n_channels & 1 ? LOOP_CHANNELS : n_channels; /* of the plan */
+#endif
     bits = FUZZ_WIRE == BENCH_SERIAL && (what & 1) ? 32 : 16;
     node = what >> 4;
     range_is_less = what % 3 != 2;
@@ -347,6 +360,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *input, size_t n)
     bench_limit(MOST_INSTANTS);
     if (!bench_begin(&choice, now_us))
         return 0;
+#ifdef VL_HAS_TICK
+    if (n_channels == LOOP_CHANNELS)
+        begin_with_loop();
+#endif
     if (what & 2)
         begin_well();
     while (at < end)

@@ -58,12 +58,15 @@ bool vl_can_next_of_rows(void)
 /* Bytes of the message from `at` on, as far as they lie in one of its pieces. */
 static uint32_t copy_of_piece(uint8_t *into, uint32_t at, uint32_t most)
 {
-    const uint8_t *from = head + at;
-    uint32_t left = n_head - at;
-    if (at >= n_head + n_body) {
+    const uint8_t *from;
+    uint32_t left;
+    if (at < n_head) {
+        from = head + at;
+        left = n_head - at;
+    } else if (at >= n_head + n_body) {
         from = tail + (at - n_head - n_body);
         left = n_head + n_body + CRC_SIZE - at;
-    } else if (at >= n_head) {
+    } else {
         from = body() + (at - n_head);
         left = n_head + n_body - at;
     }

@@ -19,6 +19,10 @@ LEAST_BRANCHES = 85.0
 """Per cent, with so few requests and inputs; those of the long run are at least 95."""
 
 
+LEAST_BRANCHES_OF_LOOP = 70.0
+"""The same of the loop's part of the core; of the long run 85."""
+
+
 def _needs(*programs: str) -> None:
     """Skip where a program is missing; with ``VIBROLOCK_FIRMWARE=required``, fail."""
     missing = [name for name in programs if shutil.which(name) is None]
@@ -59,6 +63,17 @@ def test_scripts_and_fuzzing_reach_the_branches_of_the_core(tmp_path: Path) -> N
     said = _make("coverage", tmp_path, PYTHON=_python(), REQUESTS=REQUESTS, LEAST=LEAST_BRANCHES)
     (branches,) = re.findall(r"branches: ([\d.]+)%", said)
     assert float(branches) >= LEAST_BRANCHES
+
+
+@pytest.mark.slow
+def test_the_fuzzer_finds_nothing_in_the_core_with_the_loop_and_reaches_its_branches(tmp_path: Path) -> None:
+    _needs("make", "gcc", "gcovr", "clang")
+    tick = built_tick("host")
+    said = _make("fuzz-loop", tmp_path, TICK=tick, PYTHON=_python(), RUNS=2 * RUNS, SEED=1)
+    assert re.findall(r"Done (\d+) runs", said) == [str(RUNS)] * 2
+    said = _make("coverage-loop", tmp_path, TICK=tick, PYTHON=_python(), LEAST_LOOP=LEAST_BRANCHES_OF_LOOP)
+    (branches,) = re.findall(r"branches: ([\d.]+)%", said)
+    assert float(branches) >= LEAST_BRANCHES_OF_LOOP
 
 
 @pytest.mark.parametrize("with_loop", [False, True])
