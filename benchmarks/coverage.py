@@ -13,7 +13,7 @@ their converter. ``own`` is the rig of docs/tutorials/a-rig-of-your-own.md.
 """
 
 import json
-import re
+import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,23 +25,31 @@ import typer
 from scipy.stats import binomtest
 
 import rig
+from benchmarks.coverage_rigs import plan_of
 from benchmarks.frame import show
-from identification import Channel, nonlinear_mode, periodic_vibration
+from identification import Channel, NonlinearMode, nonlinear_mode, periodic_vibration
 from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.evaluation.vibrations import within_periods
+from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
+from rig.campaigns.response_controlled.points import RESONANCE_DEG
 from rig.drivers import make_daq
+from rig.measurements import backbone, continuous_backbones
 from rig.recording.reader import Recording
 from simulators import Simulation, VirtualRig
 from simulators.analysis import phase_resonance_backbone
+from vibrolock.arrays import Float
 
 PLANS = ("magnet-beam/backbone", "magnet-beam-symmetric/backbone", "friction-beam/backbone")
 MODAL = ("modal_frequency_hz", "damping_ratio")
 QUANTITIES = (*MODAL, "force_n", "amplitude_m")
+UNSETTLED = (*MODAL, "force_n")
+"""Quantities of a point that is not settled: their truth is that of phase resonance at its amplitude."""
+KINDS = ("backbone", "continuous-backbone", "response-controlled")
 WANTED = 0.93
 """Coverage that the test of significance asks for, of 95 % stated; chosen."""
 HARMONICS, SAMPLES = 15, 1024
@@ -51,7 +59,6 @@ FINER = 8
 PIECE = 20000
 """Samples that a replay takes at once between points."""
 TRUE_CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m"))
-TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorials" / "a-rig-of-your-own.md"
 
 
 @dataclass(frozen=True)
@@ -63,14 +70,6 @@ class Measured:
     ends: dict[str, tuple[float, float]]
     random: dict[str, float]
     truth: dict[str, float]
-
-
-def own_rig(folder: Path) -> Path:
-    """Write bench and plan of the tutorial into a folder, and return the path of the plan."""
-    blocks = re.findall(r"```toml\n# file: (\S+)\n(.*?)```", TUTORIAL.read_text(encoding="utf-8"), flags=re.DOTALL)
-    for name, text in blocks:
-        (folder / name).write_text(text, encoding="utf-8")
-    return folder / next(name for name, _ in blocks if name.endswith("-plan.toml"))
 
 
 def noisier(bench: Bench, factor: float) -> Bench:
@@ -111,7 +110,7 @@ def continuous(exact: VirtualRig) -> tuple[VirtualRig, int]:
 
 
 def true_vibrations(
-    exact: VirtualRig, recording: Recording, points: Sequence[Point[object]], plan: BackbonePlan, seed: int
+    exact: VirtualRig, recording: Recording, points: Sequence[Point[object]], plan: Any, seed: int
 ) -> list[tuple[float, float]]:
     """Return the fundamentals (peak) of the true force (N) and the true motion (m) of the drive point, point by point."""
     (part,) = recording.parts
@@ -141,33 +140,67 @@ def true_vibrations(
     return out
 
 
-def run_once(plan: BackbonePlan, bench: Bench, exact: VirtualRig, seed: int, at: str) -> list[Measured]:
-    """Run a backbone, identify it, and return every accepted point with the true force and amplitude.
+def run_once(plan: Any, bench: Bench, exact: VirtualRig, seed: int, at: str) -> list[Measured]:
+    """Run a plan, identify it, and return every point with the truth of force and amplitude, where there is one.
 
     ``at``: amplitude, or force for intervals of modal frequency and damping at the measured force.
     """
     with rig.run(plan, bench=bench, seed=seed) as done:
-        points = [point for point in points_of(done.recording) if point.accepted]
-        mode = nonlinear_mode(done.backbone())
-        truths = true_vibrations(exact, done.recording, points, plan, seed)
+        points = resonances(done.recording)
+        numbers = [point.number for point in points]
+        if settled(plan):
+            mode = nonlinear_mode(backbone(done.recording))
+            truths = true_vibrations(exact, done.recording, points, plan, seed)
+        else:
+            mode = unsettled_mode(done.recording)
+            truths = [(math.nan, float(amplitude)) for amplitude in mode.amplitude_m]
     intervals = {
-        name: mode.interval_at("force_n", name) if at == "force" and name in MODAL else mode.interval(name)
+        name: mode.interval_at("force_n", name) if at == "force" and name in MODAL else told(mode, name)
         for name in QUANTITIES
     }
     return [
         Measured(
-            level=point.number,
-            estimate={name: float(getattr(mode, name)[number]) for name in QUANTITIES},
-            ends={name: (float(intervals[name][number, 0]), float(intervals[name][number, 1])) for name in QUANTITIES},
-            random={name: float(mode.random(name)[number]) for name in QUANTITIES},
+            level=level,
+            estimate={name: float(getattr(mode, name)[row]) for name in QUANTITIES},
+            ends={name: (float(intervals[name][row, 0]), float(intervals[name][row, 1])) for name in QUANTITIES},
+            random={name: float(mode.random(name)[row]) for name in QUANTITIES},
             truth=dict(zip(("force_n", "amplitude_m"), truth, strict=True)),
         )
-        for number, (point, truth) in enumerate(zip(points, truths, strict=True))
+        for row, (level, truth) in enumerate(zip(numbers, truths, strict=True))
     ]
 
 
+def settled(plan: Plan) -> bool:
+    """Whether a plan's points are settled, so that force and amplitude of each have a truth of their own."""
+    return plan.kind == "response-controlled" or (isinstance(plan, BackbonePlan) and plan.evaluation != "slow-flow")
+
+
+def resonances(recording: Recording) -> list[Point[object]]:
+    """Return the accepted points at phase resonance, in the order of the plan."""
+    points = [point for point in points_of(recording) if point.accepted]
+    return [point for point in points if point.asked_phase_lag_deg in (None, RESONANCE_DEG)]
+
+
+def unsettled_mode(recording: Recording) -> NonlinearMode:
+    """Return the mode of short points or of a continuous backbone."""
+    if recording.kind == "continuous-backbone":
+        (ways,) = continuous_backbones(recording)
+        return ways.nonlinear_mode()
+    return nonlinear_mode(backbone(recording))
+
+
+def told(mode: NonlinearMode, name: str) -> Float:
+    """float[n, 2]: the interval, or what is printed as +- where there is none; NaN if nothing is."""
+    ends, middle = mode.interval(name), np.asarray(getattr(mode, name))
+    bound = mode.bound_95(name)
+    return np.where(np.isfinite(ends), ends, np.column_stack([middle - bound, middle + bound]))
+
+
 def add_modal_truth(exact: VirtualRig, points: Sequence[Measured], at: str) -> None:
-    """Add modal frequency and damping by harmonic balance, at the true amplitude or at the measured force of each point."""
+    """Add modal frequency and damping by harmonic balance, at the true amplitude or at the measured force of each point.
+
+    A point that has no true force of its own gets that of phase resonance.
+    """
     near_hz = float(np.median([point.estimate["modal_frequency_hz"] for point in points]))
     for level in sorted({point.level for point in points}):
         some = [point for point in points if point.level == level]
@@ -180,43 +213,52 @@ def add_modal_truth(exact: VirtualRig, points: Sequence[Measured], at: str) -> N
             exact, **{key: np.exp(grid)}, near_hz=near_hz, harmonics=HARMONICS, samples=SAMPLES
         )
         for one, value in zip(some, where, strict=True):
-            for name in MODAL:
+            for name in (*MODAL, *(() if np.isfinite(one.truth["force_n"]) else ("force_n",))):
                 one.truth[name] = float(np.interp(np.log(value), grid, getattr(found, name)))
 
 
 def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:
     """Return coverage, half-width and bias of a quantity over the points of all seeds, and the same level by level."""
     rows: dict[str, dict[str, float]] = {}
-    within, covered, widths = [], [], []
+    within, covered, widths, sizes = [], [], [], []
     for level in sorted({point.level for point in points}):
         some = [point for point in points if point.level == level]
         truth = np.array([point.truth[name] for point in some])
         error = np.array([point.estimate[name] for point in some]) / truth - 1.0
         ends = np.array([point.ends[name] for point in some])
         random = np.array([point.random[name] for point in some]) / truth
-        inside = (ends[:, 0] <= truth) & (truth <= ends[:, 1])
+        known = np.isfinite(ends).all(axis=1)
+        inside = ((ends[:, 0] <= truth) & (truth <= ends[:, 1]))[known]
         free = np.sqrt(1.0 - 1.0 / len(some))
         near = np.abs(error - error.mean()) <= 1.96 * random * free
         half = 0.5 * (ends[:, 1] - ends[:, 0]) / truth
         within += inside.tolist()
         covered += near.tolist() if len(some) > 1 else []
         widths += half.tolist()
+        sizes += np.abs(error).tolist()
         rows[f"point {level + 1}"] = {
-            "covered": float(inside.mean()),
+            "covered": float(inside.mean()) if inside.size else math.nan,
             "random_covered": float(near.mean()),
             "bias": float(error.mean()),
-            "scatter": float(error.std(ddof=1)) if len(some) > 1 else float("nan"),
+            "scatter": float(error.std(ddof=1)) if len(some) > 1 else math.nan,
             "half_width": float(np.median(half)),
             "random_half_width": float(1.96 * np.median(random)),
         }
-    test = binomtest(int(np.sum(within)), len(within), WANTED, alternative="less")
+    told_of = np.isfinite(widths)
+    test = binomtest(int(np.sum(within)), len(within), WANTED, alternative="less") if within else None
+    half_width, size = float(np.nanmedian(widths)) if told_of.any() else math.nan, float(np.median(sizes))
     return {
-        "outcomes": len(within),
-        "covered": float(np.mean(within)),
-        "p_of_93": float(test.pvalue),
-        "random_covered": float(np.mean(covered)) if covered else float("nan"),
-        "half_width": float(np.median(widths)),
-        "largest_bias_over_half_width": float(max(abs(row["bias"]) / row["half_width"] for row in rows.values())),
+        "outcomes": len(widths),
+        "told": float(told_of.mean()),
+        "covered": float(np.mean(within)) if within else math.nan,
+        "p_of_93": math.nan if test is None else float(test.pvalue),
+        "random_covered": float(np.mean(covered)) if covered else math.nan,
+        "half_width": half_width,
+        "median_error": size,
+        "half_width_over_error": half_width / size,
+        "largest_bias_over_half_width": float(
+            np.nanmax([abs(row["bias"]) / row["half_width"] for row in rows.values()])
+        ),
         "levels": rows,
     }
 
@@ -224,16 +266,17 @@ def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:
 def study(name: str, seeds: Sequence[int], factor: float, at: str = "amplitude") -> dict[str, Any]:
     """Run a plan with every seed and return the summary of every quantity."""
     with tempfile.TemporaryDirectory() as folder:
-        path = str(own_rig(Path(folder))) if name == "own" else name
+        path = plan_of(name, Path(folder))
         plan = load_plan(path)
-        if not isinstance(plan, BackbonePlan):
-            raise ValueError(f"{name}: is a {plan.kind}, allowed is a backbone")
+        if plan.kind not in KINDS:
+            raise ValueError(f"{name}: is a {plan.kind}, allowed is one of {', '.join(KINDS)}")
         bench = noisier(bench_of(plan, path), factor)
         exact = make_daq(bench).rig
         points = [point for seed in seeds for point in run_once(plan, bench, exact, seed, at)]
     add_modal_truth(exact, points, at)
-    planned = len(plan.targets()) * len(seeds)
-    return {"planned": planned, **{quantity: summary(points, quantity) for quantity in QUANTITIES}}
+    planned = len(plan.levels if plan.kind == "response-controlled" else plan.targets()) * len(seeds)
+    quantities = QUANTITIES if settled(plan) else UNSETTLED
+    return {"planned": planned, **{quantity: summary(points, quantity) for quantity in quantities}}
 
 
 def main(
@@ -255,6 +298,7 @@ def main(
             shown = {
                 quantity: {key: value for key, value in found[quantity].items() if key not in left_out}
                 for quantity in QUANTITIES
+                if quantity in found
             }
             show({f"{name}, noise {factor:g}": shown})
             if output is not None:

@@ -12,6 +12,10 @@ this is linear in ``m w^2``, ``m`` and ``2 m w z``. After eliminating these, ``c
 smaller eigenvalue of a 2 x 2 matrix, so that the fit needs neither start values nor iterations. Equations are weighted by
 ``1 / |S|``, which suits noise in proportion to the force.
 
+The apparent mass is that of a linear mode and so the same at all levels. Where stiffness or damping change with the lag (a
+joint that other modes load, harmonics of the force), the slope over the frequency is not that of the mass alone: the fitted
+mass moves away from that of the smallest level, and the damping by as much. The residual of one level does not show it.
+
 beta is needed because damping localised in a joint makes the modal constant complex; a phase skew between the two sensors or
 a drifting resonance has the same effect. With beta held at zero this mismatch would bias the modal frequency.
 """
@@ -19,6 +23,7 @@ a drifting resonance has the same effect. With beta held at zero this mismatch w
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +31,7 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
-from identification.nonlinear.nonlinear_modes import NonlinearMode
+from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
 from vibrolock.arrays import Complex, Float
 
 _LEVEL_TOLERANCE = 0.02  # relative deviation from the level up to which a point counts as held; chosen
@@ -59,9 +64,11 @@ def stepped_sine_mode(
     its level, ``frequency_hz`` the modal frequency, ``phase_lag_deg`` is ``90 + beta``, ``force_n`` the fitted force
     at the modal frequency. ``modal_amplitude`` is NaN without a mass-normalised shape; the amplitudes of the measured
     point and ``apparent_mass_kg`` suffice to predict responses there. Power, purity and MAC are NaN, because
-    fundamentals alone do not determine them. Standard errors treat the residual of the fit as noise and are enlarged
-    for few points: 1.96 standard errors are half of Student's 95 % interval. They are not valid if the residual is a
-    model error. Levels to which no mode can be fitted are left out and named in the notes.
+    fundamentals alone do not determine them. Random standard errors treat the residual of the fit as noise and are
+    enlarged for few points: 1.96 standard errors are half of Student's 95 % interval. Systematic ones are the distance of
+    phase resonance from the modal frequency where the modal constant is complex, and, for the damping, the relative
+    difference of the apparent mass from that of the smallest level. Levels to which no mode can be fitted are left out
+    and named in the notes.
 
     Raises `IdentificationError` if there are no response-controlled levels, or if every level has fewer than three
     usable points or no resonance.
@@ -96,15 +103,15 @@ def stepped_sine_mode(
     held = [np.median(np.abs(level.response)) for level in levels]
     motion = np.array(held) / omega ** np.array([MOTION_ORDER[level.kind] for level in levels])
     force = 2j * mass * np.exp(1j * beta) * damping * omega**2 * motion
+    errors = _errors(fits, motion)
     return NonlinearMode(
         force_n=np.abs(force),
         frequency_hz=omega / (2.0 * np.pi),
         phase_lag_deg=np.degrees(np.angle(force)),
         amplitude_m=motion,
         modal_frequency_hz=omega / (2.0 * np.pi),
-        modal_frequency_std_hz=np.array([fit.omega_std for fit in fits]) / (2.0 * np.pi),
         damping_ratio=damping,
-        damping_ratio_std=np.array([fit.damping_std for fit in fits]),
+        **errors,
         apparent_mass_kg=mass,
         fit_residual=np.array([fit.residual for fit in fits]),
         force_harmonics=np.column_stack([unknown, force]),
@@ -113,6 +120,34 @@ def stepped_sine_mode(
         specimen=levels[0].specimen,
         notes=_notes(len(responses), left_out, refusals, fitted, phase_window_deg),
     )
+
+
+def _errors(fits: Sequence[_LevelFit], motion: Float) -> dict[str, Any]:
+    """Standard errors and intervals of modal frequency and damping, by field name of `NonlinearMode`."""
+    omega, damping = np.array([fit.omega for fit in fits]), np.array([fit.damping for fit in fits])
+    mass, beta = np.array([fit.mass_kg for fit in fits]), np.array([fit.beta for fit in fits])
+    hertz = 0.5 / np.pi
+    parts = {
+        "modal_frequency_hz": (
+            hertz * omega,
+            hertz * np.array([fit.omega_std for fit in fits]),
+            hertz * omega * np.abs(damping * np.tan(beta)),
+        ),
+        "damping_ratio": (
+            damping,
+            np.array([fit.damping_std for fit in fits]),
+            damping * np.abs(mass / mass[int(np.argmin(motion))] - 1.0),
+        ),
+    }
+    shape = (len(fits), len(QUANTITIES))
+    systematic_std, random_std, interval_95 = (np.full(size, np.nan) for size in (shape, shape, (*shape, 2)))
+    out = {"systematic_std": systematic_std, "random_std": random_std, "interval_95": interval_95}
+    for name, (middle, random, systematic) in parts.items():
+        column, std = QUANTITIES.index(name), np.hypot(random, systematic)
+        systematic_std[:, column], random_std[:, column] = systematic, random
+        interval_95[:, column] = np.column_stack([middle - 1.96 * std, middle + 1.96 * std])
+        out[STANDARD_ERRORS[name]] = std
+    return out
 
 
 def _fitted(
@@ -229,7 +264,7 @@ def _notes(
         turned = max(abs(math.degrees(fit.beta)) for _, fit in fitted)
         notes.append(
             f"the modal constant turns by up to {turned:.1f} deg: phase resonance lies up to {100.0 * apart:.2f} % from the "
-            "modal frequency, which its standard error does not include"
+            "modal frequency, which its standard error includes"
         )
     for level, fit in fitted:
         if not level.frequency_hz.min() <= fit.omega / (2.0 * np.pi) <= level.frequency_hz.max():

@@ -70,12 +70,16 @@ def settled_backbone(recording: Recording, phase_lag_target_deg: float) -> Backb
 
     Raises `IdentificationError` if no point was accepted.
     """
-    points = points_of(recording)
-    accepted = [point for point in without_repetition(points) if point.accepted]
+    accepted = [point for point in without_repetition(points_of(recording)) if point.accepted]
     IdentificationError.raise_if(not accepted, "none of the recording was accepted", field="points")
-    channels, shape = channels_from(recording.channels), recorded_drive_shape(recording, points)
-    vibrations = tuple(vibration_from(point, channels, phase_lag_target_deg) for point in accepted)
-    return shape.backbone(vibrations, [point.direction for point in accepted], [point.repeat for point in accepted])
+    return backbone_of(recording, accepted, phase_lag_target_deg)
+
+
+def backbone_of(recording: Recording, points: Sequence[Point[object]], phase_lag_target_deg: float = 90.0) -> Backbone:
+    """Return some points of a recording as a backbone, in their order."""
+    channels, shape = channels_from(recording.channels), recorded_drive_shape(recording, points_of(recording))
+    vibrations = tuple(vibration_from(point, channels, phase_lag_target_deg) for point in points)
+    return shape.backbone(vibrations, [point.direction for point in points], [point.repeat for point in points])
 
 
 def point_rows(recording: Recording, number: int) -> np.ndarray:

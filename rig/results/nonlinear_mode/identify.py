@@ -9,6 +9,7 @@ from identification import (
     ContinuousBackbone,
     DecayBackbone,
     IdentificationError,
+    LinearModes,
     NonlinearMode,
     combined,
     nonlinear_mode,
@@ -35,7 +36,7 @@ def identify(paths: Sequence[Path], options: NonlinearModeOptions, progress: Pro
         return _mode_of_decay(paths, options)
     if options.near:
         raise ConfigurationError("`near`: names a mode of a decay, and the files are none; leave it out")
-    if set(kinds) <= {"frequency-responses", *STEPPED}:
+    if set(kinds) <= {"frequency-responses", *STEPPED} and not _have_resonances(paths, modes):
         if modes is not None:
             raise ConfigurationError("`modes`: stepped sines of one sensor have no use for mode shapes; leave it out")
         return _stepped_mode(paths)
@@ -50,6 +51,21 @@ def identify(paths: Sequence[Path], options: NonlinearModeOptions, progress: Pro
             )
             identified.append(replace(found, notes=(*notes, *found.notes)))
     return identified[0] if len(identified) == 1 else combined(identified)
+
+
+def _have_resonances(paths: Sequence[Path], modes: LinearModes | None) -> bool:
+    """Whether all files are recordings with points at phase resonance and a mass-normalised mode shape to evaluate them."""
+    for path in paths:
+        if kind_of(path) not in kinds_that_yield(Backbone):
+            return False
+        with Recording(path) as recording:
+            try:
+                found = backbone(recording)
+            except IdentificationError:
+                return False
+        if found.drive_mode_shape is None and modes is None:
+            return False
+    return True
 
 
 def _mode_of_decay(paths: Sequence[Path], options: NonlinearModeOptions) -> NonlinearMode:

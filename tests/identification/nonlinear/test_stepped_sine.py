@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -67,6 +69,29 @@ def test_a_turned_modal_constant_says_how_far_phase_resonance_lies_away() -> Non
     assert not any("turns by" in note for note in stepped_sine_mode([level(beta_deg=1.0)]).notes)
 
 
+def test_the_interval_of_the_frequency_holds_phase_resonance_where_the_modal_constant_is_turned() -> None:
+    fine = np.linspace(80.0, 80.6, 60001)
+    turned = level(beta_deg=9.0, f_hz=fine)
+    resonance_hz = float(np.interp(90.0, turned.phase_lag_deg, fine))
+    low, high = stepped_sine_mode([level(beta_deg=9.0)]).interval("modal_frequency_hz")[0]
+    assert low < min(resonance_hz, 80.3)
+    assert max(resonance_hz, 80.3) < high
+
+
+def test_the_interval_of_the_damping_holds_the_truth_where_the_stiffness_changes_with_the_lag() -> None:
+    # A joint whose stiffness rises by 2 % of each step in frequency: the slope over the frequency is that of 0.98 masses.
+    omega, omega0 = 2 * np.pi * FREQUENCY_HZ, 2 * np.pi * 80.3
+    own = omega0 + 0.02 * (omega - omega0)
+    force = MASS_KG * (own**2 - omega**2 + 2j * 0.004 * own * omega) * 2e-3
+    moving = FrequencyResponse(FREQUENCY_HZ, force, np.full(omega.size, 2e-3 + 0j), "displacement", "response", 2e-3)
+    still = level(kind="displacement")
+    small = replace(still, response=5e-5 * still.response, force=5e-5 * still.force, level=1e-3)
+    mode = stepped_sine_mode([small, moving])
+    assert abs(mode.damping_ratio[1] / 0.004 - 1.0) > 0.015
+    low, high = mode.interval("damping_ratio").T
+    assert np.all((low < 0.004) & (high > 0.004))
+
+
 def test_a_turned_modal_constant_held_real_shifts_the_frequency() -> None:
     mode = stepped_sine_mode([level(beta_deg=9.0)], complex_constant=False)
     assert 0.02 < 80.3 - mode.modal_frequency_hz[0] < 0.15
@@ -75,8 +100,8 @@ def test_a_turned_modal_constant_held_real_shifts_the_frequency() -> None:
 
 def test_stated_uncertainty_covers_the_truth_under_proportional_noise() -> None:
     modes = [stepped_sine_mode([level(beta_deg=5.0, noise=0.02, seed=seed)]) for seed in range(200)]
-    frequency = [(m.modal_frequency_hz[0] - 80.3) / m.modal_frequency_std_hz[0] for m in modes]
-    damping = [(m.damping_ratio[0] - 0.004) / m.damping_ratio_std[0] for m in modes]
+    frequency = [(m.modal_frequency_hz[0] - 80.3) / m.random("modal_frequency_hz")[0] for m in modes]
+    damping = [(m.damping_ratio[0] - 0.004) / m.random("damping_ratio")[0] for m in modes]
     covered = np.mean(np.abs([frequency, damping]) < 1.96, axis=1)
     assert np.all((covered > 0.90) & (covered < 0.99)), covered
     assert abs(np.mean(damping)) < 0.4
@@ -95,8 +120,8 @@ def test_few_lags_are_enough_and_their_uncertainty_covers_the_truth(lags_deg: li
     assert exact.phase_lag_deg == pytest.approx(np.array(lags_deg) + 3.0)
     assert stepped_sine_mode([exact]).damping_ratio[0] == pytest.approx(0.004, rel=1e-7)
     modes = [stepped_sine_mode([level(f_hz=f_hz, beta_deg=3.0, noise=0.01, seed=seed)]) for seed in range(300)]
-    frequency = [(m.modal_frequency_hz[0] - 80.3) / m.modal_frequency_std_hz[0] for m in modes]
-    damping = [(m.damping_ratio[0] - 0.004) / m.damping_ratio_std[0] for m in modes]
+    frequency = [(m.modal_frequency_hz[0] - 80.3) / m.random("modal_frequency_hz")[0] for m in modes]
+    damping = [(m.damping_ratio[0] - 0.004) / m.random("damping_ratio")[0] for m in modes]
     covered = np.mean(np.abs([frequency, damping]) < 1.96, axis=1)
     assert np.all((covered > 0.91) & (covered < 0.98)), covered
 

@@ -25,7 +25,7 @@ def test_every_kind_has_a_shipped_plan():
 
 def test_kinds_are_found_by_what_they_yield():
     assert set(kinds_that_yield(FrequencyResponse)) == {"stepped-sine", "stepped-phase", "response-controlled"}
-    assert set(kinds_that_yield(Backbone)) == {"backbone", "continuous-backbone", "decay"}
+    assert set(kinds_that_yield(Backbone)) == {"backbone", "continuous-backbone", "decay", "response-controlled"}
 
 
 @pytest.mark.parametrize("name", shipped_plans())
