@@ -257,7 +257,7 @@ def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:
         "median_error": size,
         "half_width_over_error": half_width / size,
         "largest_bias_over_half_width": float(
-            np.nanmax([abs(row["bias"]) / row["half_width"] for row in rows.values()])
+            np.nanmax([abs(row["bias"]) / (row["half_width"] or math.nan) for row in rows.values()])
         ),
         "levels": rows,
     }

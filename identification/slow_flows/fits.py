@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from identification.slow_flows.signals import window_correlations
 from vibrolock.arrays import Complex, Float
 
+_MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees of freedom
+
 
 @dataclass(frozen=True, eq=False)
 class LocalFit:
@@ -111,6 +113,17 @@ def noise_variances(fits: Sequence[LocalFit]) -> Float:
         if both[0] < 0.0:
             return np.array([0.0, moments[0] / expected[0, 1]])
     return np.array([moments[0] / expected[0, 0], 0.0])
+
+
+def sensor_noise(force_noise: Float, fits: Sequence[LocalFit]) -> Float:
+    """float[2]: variances of the two parts of the noise, the first as ``force_noise`` measures it between the harmonics.
+
+    The median of it is taken, because some instants are affected by the ends of the record (with four degrees of freedom it is
+    0.839 of the mean). The rest of the residual of ``fits`` is the noise of the motion.
+    """
+    force = float(np.median(force_noise)) / _MEDIAN
+    left, by_force, by_motion = np.sum([[fit.moments[0], *fit.expected[0]] for fit in fits], axis=0)
+    return np.array([force, max(0.0, float(left - force * by_force) / float(by_motion))])
 
 
 def as_settled(fit: LocalFit, residual_s2: float) -> LocalFit:

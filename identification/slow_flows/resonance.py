@@ -71,10 +71,12 @@ def resonant_vibration(
     found: Amplitudes,
     periods: float,
     warnings: tuple[str, ...] = (),
+    systematic: tuple[float, float] = (0.0, 0.0),
 ) -> PeriodicVibration:
     """Return the settled vibration at phase resonance of ``amplitude_m`` with this stiffness (1/s^2) and damping (1/s).
 
-    ``errors`` are the standard errors of stiffness and damping; ``found`` gives harmonics and the other channels.
+    ``errors`` are the random standard errors of stiffness and damping, ``systematic`` those that a further run would repeat;
+    ``found`` gives harmonics and the other channels.
     """
     if not stiffness > 0.0:
         raise IdentificationError(
@@ -92,7 +94,12 @@ def resonant_vibration(
     force, drive = find_role(flow.channels, "force"), find_role(flow.channels, "drive")
     per_stiffness = amplitude_m / flow.drive_mode_shape**2
     harmonics[force, 1] = 1j * damping_1_s * omega * per_stiffness
-    std[force, 1] = per_stiffness * float(np.hypot(errors[0], omega * errors[1])) / np.sqrt(2.0)
+    repeated = np.zeros(harmonics.shape, np.complex128)
+    repeated[force, 1] = per_stiffness * complex(
+        omega * systematic[1], systematic[0]
+    )  # in phase with the force, and ahead
+    every = np.array([errors[0], omega * errors[1], systematic[0], omega * systematic[1]])
+    std[force, 1] = per_stiffness * float(np.linalg.norm(every)) / np.sqrt(2.0)
     # The drive channel is the reference of all displacements and has no error here; its error is in k and c.
     harmonics[drive, 1] = (1j * omega) ** MOTION_ORDER[flow.channels[drive].motion] * amplitude_m
     return PeriodicVibration(
@@ -103,4 +110,5 @@ def resonant_vibration(
         residual_rms=std[:, 1],
         harmonics_std=std,
         warnings=warnings,
+        rounding_std=repeated if any(systematic) else None,
     )

@@ -1,4 +1,10 @@
-"""A point of a backbone from few periods, including the approach, settled or not."""
+"""A point of a backbone from few periods, including the approach, settled or not.
+
+What a growing vibration feigns (joints that creep, a mean deflection that lags behind, other modes) goes with the rate of
+growth, and on the approach the rate goes with the distance from the level that is approached. The properties are fitted over
+the level, and so at its end they are free of it to first order. They are quadratic in the level; how far the linear fit lies
+from them, beyond noise, is a systematic standard error.
+"""
 
 from dataclasses import dataclass
 
@@ -6,13 +12,18 @@ import numpy as np
 
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
-from identification.slow_flows.fits import noise_variances
+from identification.slow_flows.fits import LocalFit, noise_variances, sensor_noise
 from identification.slow_flows.resonance import amplitudes_at, fit_at, resonant_vibration
 from identification.slow_flows.slow_flow import SlowFlow
+from vibrolock.arrays import Float
 
 _FEWEST_PERIODS = 2.0
 """Fewest periods in a short point. Chosen."""
 _STEADY = 0.02  # relative change of the amplitude below which properties are taken as linear in time
+_END_PERIODS = 2.0
+"""Periods at the end whose mean amplitude is that of the point. Chosen."""
+_DEGREE = 2
+"""Degree over the level. Chosen."""
 _LARGEST_CHANGE = 0.5
 """Largest relative change of the amplitude within a short point. Chosen."""
 
@@ -26,7 +37,7 @@ class ShortPoint:
     vibration
         The settled vibration at phase resonance with the identified properties, to be used as a point of a `Backbone`.
     modal_frequency_hz, modal_frequency_std_hz, damping_ratio, damping_ratio_std
-        Identified properties with standard errors.
+        Identified properties with standard errors, random and systematic together.
     phase_lag_deg
         Mean measured lag of the displacement behind the force, for which the properties are corrected.
     growth_1_s
@@ -48,10 +59,17 @@ class ShortPoint:
     periods: float
 
 
-def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float | None = None) -> ShortPoint:
-    """Identify modal properties at the amplitude that the vibration had from ``start_s`` to ``stop_s``.
+def short_point(
+    flow: SlowFlow,
+    *,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    other_modes: SlowFlow | None = None,
+) -> ShortPoint:
+    """Identify modal properties at the amplitude to which the vibration had come at ``stop_s``.
 
-    Returns the point at the mean amplitude of this part.
+    Returns the point at the mean amplitude of the last two periods; where the amplitude changes by less than 2 %, at that of
+    the whole part.
 
     Raises `IdentificationError` if there are fewer than two periods, the amplitude changes by more than half, or the
     stiffness is not positive.
@@ -64,6 +82,9 @@ def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float |
     start_s, stop_s
         Begin and end of the point, seconds from the first sample; the whole flow if None. Every instant also includes one and
         a half periods before and after it.
+    other_modes
+        Slow flow of the same record with a receptance of the other modes that is one standard error off. What the properties
+        differ by is a further systematic standard error. None where it is known.
     """
     part = flow.between(flow.time_s[0] if start_s is None else start_s, flow.time_s[-1] if stop_s is None else stop_s)
     periods = float(part.phase_periods[-1] - part.phase_periods[0])
@@ -76,25 +97,64 @@ def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float |
         reason = f"the amplitude changes by {100.0 * change:.0f} %"
         allowed = f"{100.0 * _LARGEST_CHANGE:g} %"
         raise IdentificationError(reason, field="start_s, stop_s", allowed=allowed, hint="begin the point later")
-    centre = float(np.mean(level))
-    middle = part.phase_periods - np.mean(part.phase_periods)
-    place = (level - centre) / change if change > _STEADY else middle / periods
-    weight = np.ones(place.size)
-    fit = fit_at(part, place, weight, 1)
-    errors = fit.standard_errors(noise_variances([fit]))
-    size = float(np.exp(centre))
+    where = _where(part, level, change, periods)
+    fit, random, systematic = _fitted(part, where)
+    if other_modes is not None:
+        other = fit_at(other_modes.between(part.time_s[0], part.time_s[-1]), where.place, where.weight, where.degree)
+        systematic = np.hypot(systematic, [other.stiffness - fit.stiffness, other.damping - fit.damping])
     vibration = resonant_vibration(
-        part, size, fit.stiffness, fit.damping, errors, amplitudes_at(part, place, weight, 1), periods
+        part,
+        where.amplitude_m,
+        fit.stiffness,
+        fit.damping,
+        (float(random[0]), float(random[1])),
+        amplitudes_at(part, where.place, where.weight, where.degree),
+        periods,
+        systematic=(float(systematic[0]), float(systematic[1])),
     )
-    omega = float(np.sqrt(fit.stiffness))
+    omega, errors = float(np.sqrt(fit.stiffness)), np.hypot(random, systematic)
     return ShortPoint(
         vibration=vibration,
         modal_frequency_hz=omega / (2.0 * np.pi),
-        modal_frequency_std_hz=errors[0] / (4.0 * np.pi * omega),
+        modal_frequency_std_hz=float(errors[0]) / (4.0 * np.pi * omega),
         damping_ratio=fit.damping / (2.0 * omega),
-        damping_ratio_std=errors[1] / (2.0 * omega),
+        damping_ratio_std=float(errors[1]) / (2.0 * omega),
         phase_lag_deg=float(np.degrees(np.angle(np.mean(part.force[:, 1] * np.conj(part.drive_m))))),
         growth_1_s=float(np.mean(part.growth_1_s)),
         force_n=float(np.mean(part.force_n)),
         periods=periods,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Where:
+    """Amplitude of a point, places of the instants (zero at the point), their weights, and the degree over the place."""
+
+    amplitude_m: float
+    place: Float
+    weight: Float
+    degree: int
+
+
+def _where(part: SlowFlow, level: Float, change: float, periods: float) -> _Where:
+    weight = np.ones(level.size)
+    if change <= _STEADY:
+        middle = part.phase_periods - np.mean(part.phase_periods)
+        return _Where(float(np.exp(np.mean(level))), middle / periods, weight, 1)
+    end = float(np.mean(level[part.phase_periods >= part.phase_periods[-1] - _END_PERIODS]))
+    return _Where(float(np.exp(end)), (level - end) / change, weight, _DEGREE)
+
+
+def _fitted(part: SlowFlow, where: _Where) -> tuple[LocalFit, Float, Float]:
+    """Return the fit, and float[2] each: random and systematic standard errors of stiffness and damping."""
+    fit = fit_at(part, where.place, where.weight, where.degree)
+    noise = noise_variances([fit])
+    if not noise[0] > 0.0:  # few instants do not tell the two parts apart, and the first averages out less
+        noise = sensor_noise(part.force_noise, [fit])
+    random = np.array(fit.standard_errors(noise))
+    if where.degree == 1:
+        return fit, random, np.zeros(2)
+    linear = fit_at(part, where.place, where.weight, 1)
+    apart = np.array([linear.stiffness - fit.stiffness, linear.damping - fit.damping])
+    by_noise = np.array(linear.standard_errors(noise))
+    return fit, random, np.sqrt(np.maximum(apart**2 - np.maximum(random**2 - by_noise**2, 0.0), 0.0))

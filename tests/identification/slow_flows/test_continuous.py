@@ -47,7 +47,7 @@ def test_a_bias_of_opposite_signs_cancels_and_is_given_as_systematic_error() -> 
     np.testing.assert_allclose(up, 1.08 * damping_ratio(LEVELS), rtol=0.02)
     np.testing.assert_allclose(down, 0.92 * damping_ratio(LEVELS), rtol=0.02)
     np.testing.assert_allclose(mode.damping_ratio, damping_ratio(LEVELS), rtol=0.02)
-    np.testing.assert_allclose(mode.systematic("damping_ratio"), 0.08 * damping_ratio(LEVELS), rtol=0.2)
+    np.testing.assert_allclose(mode.systematic("damping_ratio"), 0.08 / 3.0 * damping_ratio(LEVELS), rtol=0.2)
     assert np.all(mode.damping_ratio_std >= mode.systematic("damping_ratio"))
     inside = mode.interval("damping_ratio")
     assert np.all((inside[:, 0] < damping_ratio(LEVELS)) & (damping_ratio(LEVELS) < inside[:, 1]))

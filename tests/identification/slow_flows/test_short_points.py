@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,44 @@ def test_the_nonlinear_mode_finds_what_the_point_says_with_its_standard_errors()
     assert mode.damping_ratio[0] == pytest.approx(point.damping_ratio, rel=1e-12)
     assert mode.damping_ratio_std[0] == pytest.approx(point.damping_ratio_std, rel=0.2)
     assert mode.modal_frequency_std_hz[0] == pytest.approx(point.modal_frequency_std_hz, rel=0.2)
+
+
+def test_doubt_about_other_modes_is_a_systematic_error() -> None:
+    record = approached(3e-4, 4e-4)
+    other = slow_flow(
+        record.theta, record.samples, CHANNELS, sample_rate_hz=RATE_HZ, drive_mode_shape=PHI, residual_m_n=2e-6
+    )
+    sure, doubted = (short_point(flow_of(record), start_s=6 / 25, other_modes=one) for one in (None, other))
+    shifted = short_point(other, start_s=6 / 25)
+    apart = shifted.damping_ratio - sure.damping_ratio
+    assert doubted.damping_ratio == sure.damping_ratio
+    assert abs(apart) > 0.1 * sure.damping_ratio_std
+    assert doubted.damping_ratio_std == pytest.approx(np.hypot(sure.damping_ratio_std, apart), rel=0.02)
+    mode = nonlinear_mode(Backbone((doubted.vibration,), "mode", PHI), draws=4000)
+    assert mode.damping_ratio_std[0] == pytest.approx(doubted.damping_ratio_std, rel=0.2)
+    assert mode.systematic("damping_ratio")[0] > 0.0
+
+
+def test_what_goes_with_the_growth_is_gone_at_the_end_of_the_approach() -> None:
+    growth = 0.35  # 1/s, of an exponential approach; the joint feigns 3 % of damping per unit of it
+    turns = np.arange(0.0, 20.0, 0.5)
+    level = -0.1 * np.exp(-turns / 4.0)
+    flow = flow_of(approached(3e-4, 4e-4))
+    keep = np.zeros(flow.time_s.size, bool)
+    keep[: turns.size] = True
+    rate = 2j * np.pi * 25.0 + growth * np.exp(-turns / 4.0)
+    damping = 2.0 * 0.004 * 157.0 * (1.0 + 0.03 * rate.real / growth)
+    part = replace(
+        flow.select(keep),
+        time_s=turns[: keep.sum()] / 25.0,
+        phase_periods=turns[: keep.sum()],
+        drive_m=(4e-4 * np.exp(level))[: keep.sum()].astype(complex),
+        rate_1_s=rate[: keep.sum()],
+        dynamic_stiffness=(157.0**2 + damping * rate)[: keep.sum()],
+    )
+    point = short_point(part)
+    assert point.damping_ratio == pytest.approx(0.004, rel=0.004)
+    assert point.vibration.amplitude_m > 0.99 * 4e-4 * np.exp(level[: keep.sum()][-1])
 
 
 def test_the_lag_and_the_growth_as_they_were_are_told() -> None:
