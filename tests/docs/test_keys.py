@@ -7,6 +7,7 @@ import pytest
 from rig import errors as rig_errors
 from rig.reference.keys import keys_of, parts_of, roots, tables
 from rig.tick.layout import DEVICE_SHIFT
+from rig.wire.can.frames import BusTiming
 from rig.wire.can.link import CanLink
 from rig.wire.can.slcan import SlcanBus
 from simulators.kernels import Flag
@@ -51,4 +52,5 @@ def test_what_goes_wrong_on_a_bus_names_every_counter_of_it_and_errors_that_ther
     errors = {word for word in words if word.startswith("Daq")}
     assert errors <= set(rig_errors.__all__)
     of_the_driver = "lost_samples", "retries", "late_blocks", "reordered_blocks"
-    assert words - errors == {*CanLink(SlcanBus("a port"), 4).counters, *of_the_driver}
+    link = CanLink(SlcanBus("a port"), 4, BusTiming(fd=True))
+    assert words - errors == {*link.counters, *of_the_driver}
