@@ -49,7 +49,9 @@ def loop() -> Iterator[Ratio]:
         found = measured[bench]
         yield Ratio(f"integrator, {bench}", "fused loop", found["share_of_integrator"])
         yield Ratio(f"tick, {bench}", "fused loop", found["share_of_tick"])
-        yield Ratio(f"exchange in blocks of 64, {bench}", "fused loop", found["exchange_64_over_fused"])
+        for block in (1, 64):
+            name = f"exchange in blocks of {block}, {bench}"
+            yield Ratio(name, "fused loop", found[f"exchange_{block}_over_fused"])
         whole = found["recorded_us_per_sample"] / found["fused_us_per_sample"]
         yield Ratio(f"a whole backbone with journal and file, {bench}", "fused loop", whole)
     yield Ratio("real time, magnet-beam", "fused loop", measured["magnet-beam"]["fused_realtime_factor"])
@@ -76,6 +78,13 @@ def commands() -> Iterator[Ratio]:
         base = statistics.median(times.pop(""))
         for name, values in times.items():
             yield Ratio(name, f"starting Python with numpy ({base:.2f} s)", statistics.median(values) / base)
+
+
+def waits() -> Iterator[Ratio]:
+    """What people wait for, rehearsal included, with memory."""
+    for name, found in _json("benchmarks.waits", "--rehearse", "--json")["commands"].items():
+        for what in ("processor", "memory"):
+            yield Ratio(f"{name}, {what}", "starting Python with numpy", found[f"{what}_over_numpy"])
 
 
 def points() -> Iterator[Ratio]:
@@ -148,7 +157,7 @@ def put(page: Path, text: str) -> None:
 
 def main(minutes: float = 0.0, page: Path | None = None) -> None:
     """Measure all ratios, with ``minutes`` of the loop by the clock at each rate; print them, and put them into a page."""
-    parts: list[Callable[[], Iterator[Ratio]]] = [commands, loop, points, pnlss, tables]
+    parts: list[Callable[[], Iterator[Ratio]]] = [commands, waits, loop, points, pnlss, tables]
     if minutes > 0.0 and shutil.which("cyclictest"):
         parts.append(partial(wall_clock, minutes))
     ratios: list[Ratio] = []

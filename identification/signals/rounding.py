@@ -21,6 +21,7 @@ from functools import cache
 import numpy as np
 
 from vibrolock.arrays import Complex, Float
+from vibrolock.compiled import kernel
 
 JUDGED = 16384
 """Number of samples of a record from which its rounding is judged; a longer record has no more of it."""
@@ -35,6 +36,8 @@ _SIZES = np.array([-0.25, 0.0, 0.25])
 _ODD = np.array([[1.0, -1.0, 1.0], [0.0, 4.0, -12.0], [0.0, 0.0, 16.0]])
 _EVEN = np.array([[2.0, -4.0, 6.0], [0.0, 8.0, -32.0], [0.0, 0.0, 32.0]])
 """``sin(n x)/sin(x)`` for n = 1, 3, 5, and that over cos(x) for n = 2, 4, 6: factors of 1, cos(x)^2, cos(x)^4 in columns."""
+_ROUNDS = 1.5 * 2.0**52
+"""Added and subtracted again it leaves the nearest whole number (below 2^51), in vectors on any processor."""
 _SPREAD = np.sqrt(0.5)
 """Standard deviation of a sine of unknown phase over its largest value, as the error is over the size of the vibration. The
 part in quadrature depends on the shape besides, and is not reduced."""
@@ -97,13 +100,14 @@ def _coefficients(turns: Float, position: Float, terms: Float) -> Complex:
     peak = np.maximum(np.max(np.abs(position), axis=1), 1e-9)
     sizes = np.maximum(1.0 + np.multiply.outer(1.0 / peak, _SIZES), 0.0)
     factors = [_in_cosine(sines) for sines in terms.T]
+    half_angle = _half_angle()
     columns = turns.reshape(-1, turns.shape[2])
     sums = np.zeros((position.shape[0] * 2 * len(_SIZES), columns.shape[0]))
     for start in range(0, position.shape[1], _BLOCK):
         block = slice(start, start + _BLOCK)
         errors = np.empty((position.shape[0], 2, len(_SIZES), columns[0, block].size))
         for scale, where, known, out in zip(sizes, position[:, block], factors, errors, strict=True):
-            _errors(np.multiply.outer(scale, where), known, out)
+            mean_errors(where, scale, *half_angle, *known, out)
         sums += errors.reshape(sums.shape[0], -1) @ columns[:, block].T
     sums = sums.reshape(*errors.shape[:-1], -1)
     found = (2.0 / position.shape[1]) * (sums[..., : turns.shape[1]] + 1j * sums[..., turns.shape[1] :])
@@ -112,36 +116,34 @@ def _coefficients(turns: Float, position: Float, terms: Float) -> Complex:
 
 
 def _in_cosine(terms: Float) -> tuple[Float, Float]:
-    """Coefficients of P and Q in ``sum_n terms[n - 1] sin(n x) = sin(x) (P(c^2) + c Q(c^2))``, c = cos(x); those needed."""
-    orders = int(np.count_nonzero(terms))
-    odd, even = (orders + 1) // 2, orders // 2
-    return _ODD[:odd, :odd] @ terms[: 2 * odd : 2], _EVEN[:even, :even] @ terms[1 : 2 * even : 2]
+    """Coefficients of P and Q in ``sum_n terms[n - 1] sin(n x) = sin(x) (P(c^2) + c Q(c^2))``, c = cos(x); three each."""
+    return _ODD @ terms[::2], _EVEN @ terms[1::2]
 
 
-def _errors(turns: Float, factors: tuple[Float, Float], out: Float) -> None:
-    """Put mean errors at a number of ``turns``, which are overwritten, and those a quarter of a turn farther, into ``out``."""
-    turns -= np.rint(turns)
-    squared = turns * turns
-    for_sine, for_cosine = _half_angle()
-    half = _polynomial(for_sine, squared)
-    half *= turns
-    cosine, sine = half * half, _polynomial(for_cosine, squared)
-    cosine *= -2.0
-    cosine += 1.0
-    sine *= half
-    sine *= 2.0
-    _series(sine, cosine, factors, out[0])
-    _series(cosine, np.negative(sine, out=squared), factors, out[1])
+@kernel
+def mean_errors(
+    where: Float, scale: Float, for_sine: Float, for_cosine: Float, odd: Float, even: Float, out: Float
+) -> None:
+    """Put the mean errors at ``where`` times each ``scale``, in steps, and those a quarter of a step farther, into ``out``.
 
-
-def _series(sine: Float, cosine: Float, factors: tuple[Float, Float], out: Float) -> None:
-    squared = cosine * cosine
-    total = _polynomial(factors[0], squared)
-    if factors[1].size:
-        more = _polynomial(factors[1], squared)
-        more *= cosine
-        total += more
-    np.multiply(total, sine, out=out)
+    ``where`` float[n], ``out`` float[2, n_scales, n]; the other arguments are those of `_half_angle` and `_in_cosine`.
+    """
+    s0, s1, s2, s3, s4, s5, s6 = for_sine
+    c0, c1, c2, c3, c4, c5, c6, c7 = for_cosine
+    p0, p1, p2 = odd
+    q0, q1, q2 = even
+    for j in range(scale.size):
+        factor = scale[j]
+        for k in range(where.size):
+            turns = factor * where[k]
+            turns -= (turns + _ROUNDS) - _ROUNDS
+            x = turns * turns
+            half = ((((((s6 * x + s5) * x + s4) * x + s3) * x + s2) * x + s1) * x + s0) * turns
+            other = ((((((c7 * x + c6) * x + c5) * x + c4) * x + c3) * x + c2) * x + c1) * x + c0
+            cosine, sine = 1.0 - 2.0 * (half * half), 2.0 * (other * half)
+            at, across = cosine * cosine, sine * sine
+            out[0, j, k] = sine * ((p2 * at + p1) * at + p0 + ((q2 * at + q1) * at + q0) * cosine)
+            out[1, j, k] = cosine * ((p2 * across + p1) * across + p0 - ((q2 * across + q1) * across + q0) * sine)
 
 
 @cache
@@ -155,15 +157,6 @@ def _half_angle() -> tuple[Float, Float]:
 def _fitted(function: Callable[[Float], Float], degree: int) -> Float:
     fit = np.polynomial.Chebyshev.interpolate(function, degree, domain=(0.0, 0.25))
     return np.asarray(fit.convert(kind=np.polynomial.Polynomial).coef)
-
-
-def _polynomial(coefficients: Float, x: Float) -> Float:
-    """Value of a polynomial, from its constant up. Numbers in place of arrays of factors: numpy is quicker with them."""
-    out = np.full_like(x, coefficients[-1])
-    for coefficient in coefficients[-2::-1].tolist():
-        out *= x
-        out += coefficient
-    return out
 
 
 def _largest(found: Complex, steps: Complex) -> Complex:
