@@ -17,10 +17,10 @@ from tests.sharing import made_once, shared_folder
 
 FOLDER = Path(__file__).parents[2] / "firmware"
 ARM = ("make", "arm-none-eabi-gcc", "newlib")
-NEEDS = {"mps2-an386": ARM, "nucleo-h743zi2": ARM}
+NEEDS = {"mps2-an386": ARM, "nucleo-h743zi2": ARM, "nucleo-h743zi2-can": ARM}
 """Programs that a target needs; others need those of this computer."""
 HOSTS = ("make", "cc")
-LOOP_BOARDS = ("mps2-an500", "nucleo-h743zi2")
+LOOP_BOARDS = ("mps2-an500", "nucleo-h743zi2", "nucleo-h743zi2-can")
 """Targets with a Cortex-M7, which can run the loop."""
 MAKING_S = 900.0
 

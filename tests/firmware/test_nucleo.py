@@ -5,7 +5,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from tests.firmware.building import built
+from tests.firmware.building import built, built_with_loop
 
 FLASH, TIGHTLY_COUPLED, REACHED_BY_DMA = (
     range(0x08000000, 0x08200000),
@@ -20,12 +20,16 @@ def image():
     return built("nucleo-h743zi2")
 
 
-@pytest.fixture(scope="module")
-def symbols(image):
+def symbols_of(image):
     listed = subprocess.run(["arm-none-eabi-nm", image], capture_output=True, text=True, check=True).stdout
     return {
         name: int(at, 16) for at, _, name in (line.split() for line in listed.splitlines() if len(line.split()) == 3)
     }
+
+
+@pytest.fixture(scope="module")
+def symbols(image):
+    return symbols_of(image)
 
 
 def test_the_chip_finds_stack_reset_and_the_interrupt_of_the_converters(image, symbols, tmp_path):
@@ -43,4 +47,13 @@ def test_the_chip_finds_stack_reset_and_the_interrupt_of_the_converters(image, s
 def test_what_the_dma_fills_lies_where_it_reaches_and_the_stack_has_room(symbols):
     for name in ("counts_in", "ring", "sending"):
         assert symbols[name] in REACHED_BY_DMA, name
+    assert TIGHTLY_COUPLED.stop - symbols["bss_end"] >= 8192
+
+
+@pytest.mark.parametrize("make", [built, built_with_loop], ids=["alone", "with the loop"])
+def test_over_can_fd_it_is_linked_with_that_wire_alone_and_the_stack_has_room(make):
+    symbols = symbols_of(make("nucleo-h743zi2-can"))
+    assert "vl_can_fd" in symbols
+    assert "vl_serial" not in symbols
+    assert ("vibrolock_tick_digest" in symbols) == (make is built_with_loop)
     assert TIGHTLY_COUPLED.stop - symbols["bss_end"] >= 8192

@@ -19,6 +19,7 @@ void converters_to_middle(void); /* the output at 0 V, also in a fault */
 void converters_interrupt(void); /* DMA1 stream 0: all channels of an instant are there */
 
 void line_begin(uint32_t baud);
+void bus_begin(uint8_t node);
 
 int main(void);
 

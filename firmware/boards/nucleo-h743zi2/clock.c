@@ -7,7 +7,7 @@
 #define WAIT_UNTIL(condition) while (!(condition)) {}
 
 enum { FROM_PLL1 = 3, FROM_HSE = 2, SCALE_1 = 3 };
-enum { OF_2_MHZ = 4, TIMES_480 = 480, BY_2 = 2 };   /* 8 MHz / 4 x 480 / 2 */
+enum { OF_2_MHZ = 4, TIMES_480 = 480, BY_2 = 2, BY_12 = 12 }; /* 8 MHz / 4 x 480 / 2; and / 12 = 80 MHz, for the bus */
 enum { HALF_HPRE = 8, HALF_PPRE = 4 };              /* codes of RCC for a half: buses at 240 MHz, peripherals at 120 MHz */
 
 /* The core's voltage for 480 MHz (scale 0, RM0433 6.8.6): scale 1, then the overdrive. Chips of revision V only. */
@@ -41,8 +41,8 @@ void clock_begin(void)
     RCC_CR |= BIT(18) | BIT(16); /* HSEBYP, HSEON */
     WAIT_UNTIL(RCC_CR & BIT(17))
     RCC_PLLCKSELR = OF_2_MHZ << 4 | FROM_HSE;
-    RCC_PLLCFGR = BIT(16) | 1u << 2; /* DIVP1EN; PLL1RGE: 2 to 4 MHz come in; PLL1VCOSEL 0: 192 to 960 MHz come out */
-    RCC_PLL1DIVR = 1u << 24 | 1u << 16 | (BY_2 - 1) << 9 | (TIMES_480 - 1);
+    RCC_PLLCFGR = BIT(17) | BIT(16) | 1u << 2; /* DIVQ1EN, DIVP1EN; PLL1RGE: 2 to 4 MHz come in; PLL1VCOSEL 0: 192 to 960 MHz come out */
+    RCC_PLL1DIVR = 1u << 24 | (BY_12 - 1) << 16 | (BY_2 - 1) << 9 | (TIMES_480 - 1);
     RCC_CR |= BIT(24);
     WAIT_UNTIL(RCC_CR & BIT(25))
     RCC_D1CFGR = HALF_PPRE << 4 | HALF_HPRE;

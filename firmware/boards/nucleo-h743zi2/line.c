@@ -61,6 +61,7 @@ size_t board_write(const uint8_t *bytes, size_t n)
     return n;
 }
 
+#ifndef NUCLEO_CAN
 bool board_receive_frame(struct vl_frame *frame)
 {
     (void)frame;
@@ -72,3 +73,4 @@ bool board_send_frame(const struct vl_frame *frame)
     (void)frame;
     return false;
 }
+#endif

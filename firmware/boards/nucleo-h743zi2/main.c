@@ -1,4 +1,4 @@
-/* The device on a NUCLEO-H743ZI2 (Cortex-M7, 480 MHz) over the debugger's serial line. **It has not run on silicon.** What to check
+/* The device on a NUCLEO-H743ZI2 (Cortex-M7, 480 MHz) over the debugger's serial line, or with NUCLEO_CAN over CAN FD. **It has not run on silicon.** What to check
  * first: docs/how-to/first-hour-with-a-nucleo.md. */
 
 #include "board.h"
@@ -8,6 +8,9 @@
 
 #ifndef BAUD
 #define BAUD 3000000u
+#endif
+#ifndef NUCLEO_NODE
+#define NUCLEO_NODE 1
 #endif
 #define FULL_V 10.0f  /* of the front end: +10 to -10 V become 0 to 3.3 V */
 #define RANGE_V 9.4f  /* its amplifiers saturate 0.1 V from their supplies */
@@ -37,7 +40,12 @@ static struct vl_description device = {
     .shortest_watchdog_us = 5000,
     .longest_watchdog_us = 600 * 1000 * 1000,
     .filter_delay_ns = 3 * PER_CHANNEL_NS / 2, /* of the converters alone: add that of your filters */
+#ifdef NUCLEO_CAN
+    .wire = &vl_can_fd,
+    .node = NUCLEO_NODE,
+#else
     .wire = &vl_serial,
+#endif
 };
 
 static void tell_serial_number(void)
@@ -54,7 +62,11 @@ int main(void)
     tell_serial_number();
     device.lowest_rate_mhz = board_nearest_rate_mhz(1000u * 1000u);
     device.highest_rate_mhz = board_nearest_rate_mhz(10u * 1000u * 1000u);
+#ifdef NUCLEO_CAN
+    bus_begin(NUCLEO_NODE);
+#else
     line_begin(BAUD);
+#endif
     const bool fits = vl_begin(&device, clock_random());
     clock_begin_watchdog(); /* if the description does not fit, it resets the chip again and again, with the output at 0 V */
     while (fits)
