@@ -81,11 +81,12 @@ CONVERTER = record(i8="oversampling", f8="adc_step_v adc_codes_per_v adc_range_v
 class RigArrays(NamedTuple):
     """The rig's constant arrays for the kernels; never written to during a run.
 
-    ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_joint]``; its
-    rows are ``[joint coordinates, local coordinates, x]``. ``correct`` [n_site, n_row]: contribution of a change of each site
-    force over the sub-step. ``elements`` [2, n_element, n_joint]: stiffness and slip force of every Jenkins element;
-    ``stuck`` [n_joint]: sum of the stiffnesses of a joint. ``sense`` [n_input, n_padded]: outputs (SI) from the same input
-    vector. Inputs, rows, joints and channels (n_padded) are padded with zeros to whole vectors of the compiled loops.
+    ``step`` [n_input, n_row]: column of the sub-step map per entry of the input vector ``[x, u, f_local, f_joint, d_local,
+    d_joint]``, d being the last increments of the forces; its rows are ``[joint coordinates, local coordinates, x]``.
+    ``correct`` [n_site, n_row]: contribution of the change of the increment of each site force. ``elements`` [2, n_element,
+    n_joint]: stiffness and slip force of every Jenkins element; ``stuck`` [n_joint]: sum of the stiffnesses of a joint.
+    ``sense`` [n_sensed, n_padded]: outputs (SI) from the same input vector as far as f_joint. Sensed inputs, rows, joints and
+    channels (n_padded) are padded with zeros to whole vectors of the compiled loops.
 
     ``conditioning`` [5, n_padded]: coefficients hold, old and new of the low-pass that forms a sensor's high-pass, V per SI
     unit, and the sensor's range (V). ``noise_keys`` [1 + n_channel]: key of the output, then of each channel. ``sections``
@@ -113,8 +114,9 @@ class RigArrays(NamedTuple):
 class RigState(NamedTuple):
     """Everything a run depends on, and the scratch space of its kernels.
 
-    ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_joint]`` at the present instant. ``deflection``
-    [n_joint] and ``friction`` [n_element, n_joint]: committed state of the Jenkins elements. ``filters``
+    ``inputs`` [n_input]: the input vector ``[x, u, f_local, f_joint, d_local, d_joint]`` at the present instant.
+    ``deflection`` [n_joint], its last ``increment`` [n_joint] and ``friction`` [n_element, n_joint]: state of the Jenkins
+    elements. ``filters``
     [2, n_padded]: high-pass states (low-passed value, last value). ``counter`` [1]: index of the next sample, from
     which its noise is drawn. ``memory`` [n_section, 2, n_padded] and ``output_memory`` [n_section, 2]: state of the
     filters. ``history`` [n_ring, n_channel]: ring of conditioned volts at internal instants; its length is a power of two, or 0
@@ -123,6 +125,7 @@ class RigState(NamedTuple):
 
     inputs: NDArray[np.float64]
     deflection: NDArray[np.float64]
+    increment: NDArray[np.float64]
     friction: NDArray[np.float64]
     filters: NDArray[np.float64]
     counter: NDArray[np.int64]
@@ -133,4 +136,5 @@ class RigState(NamedTuple):
     forces: NDArray[np.float64]
     joints: NDArray[np.float64]
     changes: NDArray[np.float64]
+    increments: NDArray[np.float64]
     outputs: NDArray[np.float64]

@@ -102,6 +102,20 @@ greatest: Any = _lane_by_lane(lambda builder, a, b: builder.select(builder.fcmp_
 """``greatest(a, b)``: the larger one, lane by lane; b where one is not a number."""
 
 
+def _fused(typing: Any, a: Any, b: Any, c: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        prototype = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
+        name = f"llvm.fmuladd.v{WIDTH}f64"
+        function = builder.module.globals.get(name) or ir.Function(builder.module, prototype, name)
+        return builder.call(function, arguments)
+
+    return _lanes(_lanes, _lanes, _lanes), generate
+
+
+multiply_add: Any = intrinsic(_fused)
+"""``multiply_add(a, b, c)``: a b + c, rounded once where the processor has an instruction for it, else twice."""
+
+
 def _operator(symbol: Any, build: Callable[[Any, Any, Any], Any]) -> None:
     """Define an operator between two vectors of lanes."""
     compute = _lane_by_lane(build)

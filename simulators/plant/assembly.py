@@ -23,7 +23,7 @@ from vibrolock.errors import InputError
 
 LARGEST_STEP = 0.5
 """Largest product of the integration step and the angular frequency of the stiffest element on the structure's modes. A contact
-then lasts at least six steps, and a hard bounce changes the energy by at most 8 % (1 % at 0.2, 0.3 % at 0.1)."""
+then lasts at least six steps, and a hard bounce changes the energy by at most 6 % (1 % at 0.2, 0.3 % at 0.1)."""
 GROWTH = 1e-6
 """Largest real part of a pole, relative to the modulus of the largest pole, that counts as rounding."""
 
@@ -211,7 +211,7 @@ def steps_per_sample(elements: Sequence[Element], plant: LinearPlant, converter:
     """Return the integration steps per sample: those written, with ``"auto"`` the fewest that the elements allow.
 
     Raises `ValueError`, naming a sufficient step, if the slope of an element is too steep for those written.
-    Only the linear plant is integrated exactly. The force of an element is integrated by a second-order predictor-corrector,
+    Only the linear plant is integrated exactly. The force of an element is integrated by a third-order predictor-corrector,
     whose step h must resolve ``w_e^2 = k_e sum_i row_i^2``, or the rate ``c_e sum_i row_i^2`` of an element of velocity.
     """
     mobilities = [float(row @ row) for row in plant.site_rows[: len(elements)]]

@@ -32,20 +32,24 @@ class PhiMatrices(NamedTuple):
     """``h phi_1(hA) B`` [n, n_input]: effect of an input held over the step."""
     ramp: Float
     """``h phi_2(hA) B`` [n, n_input]: effect of an input that grows linearly from 0 to 1 over the step."""
+    curve: Float
+    """``2 h phi_3(hA) B`` [n, n_input]: effect of an input that grows with the square of time from 0 to 1 over the step."""
 
 
 def phi_matrices(dynamics: Float, columns: Float, step_s: float) -> PhiMatrices:
-    """Return matrix exponential, phi_1 and phi_2 from one exponential of an augmented matrix (Van Loan 1978).
+    """Return matrix exponential, phi_1, phi_2 and phi_3 from one exponential of an augmented matrix (Van Loan 1978).
 
-    ``phi_1(z) = (e^z - 1)/z`` and ``phi_2(z) = (e^z - 1 - z)/z^2`` are formed without a division.
+    ``phi_1(z) = (e^z - 1)/z``, ``phi_2(z) = (e^z - 1 - z)/z^2`` and ``phi_3(z) = (e^z - 1 - z - z^2/2)/z^3`` are formed without
+    a division.
     """
     n, k = columns.shape
-    augmented = np.zeros((n + 2 * k, n + 2 * k))
+    augmented = np.zeros((n + 3 * k, n + 3 * k))
     augmented[:n, :n] = step_s * dynamics
     augmented[:n, n : n + k] = step_s * columns
-    augmented[n : n + k, n + k :] = np.eye(k)
+    augmented[n : n + 2 * k, n + k :] = np.eye(2 * k)
     exponential = _exponential(augmented.tobytes()).reshape(augmented.shape)
-    return PhiMatrices(exponential[:n, :n], exponential[:n, n : n + k], exponential[:n, n + k :])
+    held, ramp, third = (exponential[:n, n + i * k : n + (i + 1) * k] for i in range(3))
+    return PhiMatrices(exponential[:n, :n], held, ramp, 2.0 * third)
 
 
 @lru_cache(maxsize=64)
@@ -73,15 +77,20 @@ def _exponential(matrix: bytes) -> Float:
 def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> tuple[Float, Float]:
     """Return predictor [n_input, n_row] and corrector [n_site, n_row] of the sub-step, padded for the kernels.
 
+    The increment of a force goes on in the predictor. Its change d_1 - d_0 makes the force larger by
+    ``(t + t^2) (d_1 - d_0) / 2``, t going from 0 to 1 over the step.
+
     Rows are ``[joint coordinates, element coordinates, x]``. Joints are the last ``n_joint`` sites. Their coordinates begin at
     row 0, where aligned vectors can be loaded.
     """
     columns = np.column_stack([plant.voltage_column, plant.site_columns])
     phi = phi_matrices(plant.dynamics, columns, step_s)
-    predictor = np.hstack([phi.transition, phi.held])
-    corrector = phi.ramp[:, 1:]
+    predictor = np.hstack([phi.transition, phi.held, phi.ramp[:, 1:]])
+    corrector = (phi.ramp + phi.curve)[:, 1:] / 2.0
     fold = np.vstack([np.roll(plant.site_rows, n_joint, axis=0), np.eye(plant.dynamics.shape[0])])
-    return pad((fold @ predictor).T), pad((fold @ corrector).T, rows=False)
+    even = np.zeros((predictor.shape[1] % 2, fold.shape[0]))
+    step = pad(np.vstack([(fold @ predictor).T, even]), rows=False)
+    return step, pad((fold @ corrector).T, rows=False)
 
 
 def pad(matrix: Float, *, rows: bool = True) -> Float:
@@ -180,8 +189,9 @@ def at_rest(rig: RigArrays) -> RigState:
     """Return the state of a rig at rest at sample 0."""
     n_input, n_row = rig.step.shape
     return RigState(
-        inputs=aligned(n_input),
+        inputs=aligned(round_up(n_input) + WIDTH),  # the last vector of increments may reach beyond
         deflection=aligned(rig.stuck.size),
+        increment=aligned(rig.stuck.size),
         friction=aligned(rig.elements.shape[1:]),
         filters=aligned((2, rig.sense.shape[1])),
         counter=np.zeros(1, np.int64),
@@ -191,7 +201,8 @@ def at_rest(rig: RigArrays) -> RigState:
         rows=aligned(n_row + WIDTH),  # the last vector of x may reach beyond
         forces=np.zeros(rig.sites.size),
         joints=aligned(rig.stuck.size),
-        changes=np.zeros(rig.correct.shape[0]),
+        changes=aligned(round_up(rig.correct.shape[0]) + WIDTH),
+        increments=aligned(round_up(rig.correct.shape[0]) + WIDTH),
         outputs=aligned(rig.sense.shape[1]),
     )
 

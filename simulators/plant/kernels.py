@@ -1,12 +1,18 @@
-"""Compiled plant: exact linear part, nonlinear site forces by a second-order exponential predictor-corrector (ETD2-PC).
+"""Compiled plant: exact linear part, site forces by a third-order exponential multistep method (Adams, one solve a step).
 
 Over a sub-step of length h the linear part ``x' = A x + B_u u + B_f f`` is solved exactly for a held voltage u and a force f
-that changes linearly (exponential time differencing, Cox & Matthews 2002):
+that is a parabola through its last two values and the new one (exponential time differencing, Cox & Matthews 2002; as
+predictor and corrector of Adams, Hochbruck & Ostermann 2010, section 2.6). With ``d_0 = f_0 - f_-1``:
 
-    x_1 = e^{hA} x_0 + h phi_1(hA) (B_u u + B_f f_0) + h phi_2(hA) B_f (f_1 - f_0)
+    x_p = e^{hA} x_0 + h phi_1(hA) (B_u u + B_f f_0) + h phi_2(hA) B_f d_0
+    x_1 = x_p + h (phi_3(hA) + phi_2(hA) / 2) B_f (f_1 - f_0 - d_0)
 
-The predictor takes f_1 = f_0. The corrector takes f_1 from the predicted site coordinates. The force is then evaluated from the
-corrected coordinates and kept. Friction forces of the predictor are provisional: Jenkins elements are committed once.
+f_1 is that of the predicted site coordinates. Forces of local sites are then evaluated once more, from the corrected
+coordinates, and kept: a stop may be stiff. Those of joints are kept as they are, for the two coordinates differ by a fourth
+power of the step.
+
+A joint turns between instants. Its turning point, on a parabola through three of its deflections, is passed through when the
+reversal is seen: without that the elements would slip too little, by a second power of the step.
 """
 
 from typing import Any
@@ -32,7 +38,7 @@ from simulators.layout import (
 )
 from simulators.products import add_columns, combine
 from vibrolock.compiled import Record, inner_kernel, kernel
-from vibrolock.lanes import greatest, least, load, spread, store
+from vibrolock.lanes import differ, greatest, least, load, multiply_add, spread, store
 from vibrolock.width import WIDTH
 
 
@@ -146,56 +152,88 @@ def local_forces(
 
 
 @kernel
-def joint_forces(rig: RigArrays, state: RigState, commit: bool) -> None:
-    """Write the forces of the friction joints, without the stuck linear part, to ``state.joints``: ``k delta - sum_j f_j``.
+def turn_joints(rig: RigArrays, state: RigState, first: int) -> None:
+    """Move Jenkins elements through the turning points of those of eight joints, from ``first`` on, that have reversed.
 
-    Starting from its committed force, each element slips at its limit: ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)``.
-    A vector holds the same element of eight joints. Missing joints are padded with elements of zero stiffness.
+    With the last two increments d_1, d_2 of the deflection the vertex lies ``-(d_1 + d_2)^2 / (8 (d_2 - d_1))`` beside the
+    deflection between them. An element slips at its limit on the way there; the way back is taken off its force.
+    """
+    elements, friction = rig.elements, state.friction
+    for s in range(first, first + WIDTH):
+        before, after = state.increment[s], state.rows[s] - state.deflection[s]
+        if before * after < 0.0:
+            beyond = -((before + after) ** 2) / (8.0 * (after - before))
+            for e in range(elements.shape[1]):
+                limit, change = elements[1, e, s], elements[0, e, s] * beyond
+                friction[e, s] = min(max(friction[e, s] + change, -limit), limit) - change
+
+
+@kernel
+def joint_forces(rig: RigArrays, state: RigState) -> None:
+    """Move the friction joints to the deflections in ``state.rows``; write their forces to ``state.joints``.
+
+    Without the stuck linear part these are ``k delta - sum_j f_j``. Each element slips at its limit:
+    ``f_j <- clip(f_j + k_j d(delta), +-k_j delta_j)``. A vector holds the same element of eight joints. Missing joints are
+    padded with elements of zero stiffness.
     """
     elements, rows, deflection, friction = rig.elements, state.rows, state.deflection, state.friction
     _, n_element, n_joint = elements.shape
     for s in range(0, n_joint, WIDTH):
         z = load(rows, s)
         dz = z - load(deflection, s)
+        way = dz * load(state.increment, s)
+        if differ(greatest(way, spread(0.0)), way):
+            turn_joints(rig, state, s)
         total = spread(0.0)
         for at in range(s, s + n_element * n_joint, n_joint):
             limit = load(elements, n_element * n_joint + at)
-            force = load(friction, at) + load(elements, at) * dz
+            force = multiply_add(load(elements, at), dz, load(friction, at))
             force = greatest(least(force, limit), spread(0.0) - limit)
-            if commit:
-                store(friction, at, force)
+            store(friction, at, force)
             total = total + force
         store(state.joints, s, load(rig.stuck, s) * z - total)
-        if commit:
-            store(deflection, s, z)
+        store(state.increment, s, dz)
+        store(deflection, s, z)
 
 
 @inner_kernel
 def advance(rig: RigArrays, state: RigState, voltage: float) -> int:
-    """Advance the plant by one sample with ``voltage`` (V) held; return the bits LAW_RANGE and AMPLIFIER_CLIPPED, or 0."""
-    inputs, rows, forces, joints, changes = state.inputs, state.rows, state.forces, state.joints, state.changes
+    """Advance the plant by one sample with ``voltage`` (V) held; return the bits LAW_RANGE and AMPLIFIER_CLIPPED, or 0.
+
+    Vectors that are stored beyond their part of the inputs are followed by the part that they overwrite.
+    """
+    inputs, rows, forces, joints = state.inputs, state.rows, state.forces, state.joints
+    changes, increments = state.changes, state.increments
     n, n_local, n_joint = rig.plant[0].n_state, rig.plant[0].n_local, rig.plant[0].n_joint
-    first_state, first_local, first_joint = n_joint + n_local, n + 1, n + 1 + n_local
+    n_site = n_local + n_joint
+    local, joint = n + 1, n + 1 + n_local  # where their forces begin; their increments are n_site behind
     beyond = False
     limit = rig.plant[0].input_limit_v
     held = min(max(voltage, -limit), limit)
     inputs[n] = held
     for _ in range(rig.plant[0].substeps):
         combine(rig.step, inputs, rows)
-        joint_forces(rig, state, False)
-        beyond |= local_forces(rig.sites, rows, n_joint, forces)
-        for s in range(n_local):
-            changes[s] = forces[s] - inputs[first_local + s]
-        for s in range(n_joint):
-            changes[n_local + s] = joints[s] - inputs[first_joint + s]
+        joint_forces(rig, state)
+        for s in range(0, n_joint, WIDTH):
+            increment = load(joints, s) - load(inputs, joint + s)
+            store(increments, n_local + s, increment)
+            store(changes, n_local + s, increment - load(inputs, joint + n_site + s))
+        if n_local > 0:
+            beyond |= local_forces(rig.sites, rows, n_joint, forces)
+            for s in range(n_local):
+                changes[s] = forces[s] - inputs[local + s] - inputs[local + n_site + s]
         add_columns(rig.correct, changes, rows)
-        joint_forces(rig, state, True)
-        beyond |= local_forces(rig.sites, rows, n_joint, forces)
-        for i in range(0, n, WIDTH):  # values copied beyond x are overwritten at once
-            store(inputs, i, load(rows, first_state + i))
+        if n_local > 0:
+            beyond |= local_forces(rig.sites, rows, n_joint, forces)
+            for s in range(n_local):
+                increments[s] = forces[s] - inputs[local + s]
+        for i in range(0, n, WIDTH):
+            store(inputs, i, load(rows, n_site + i))
         inputs[n] = held
         for s in range(n_local):
-            inputs[first_local + s] = forces[s]
-        for s in range(n_joint):
-            inputs[first_joint + s] = joints[s]
+            inputs[local + s] = forces[s]
+        for s in range(0, n_joint, WIDTH):
+            store(inputs, joint + s, load(joints, s))
+        for s in range(0, n_site, WIDTH):
+            store(inputs, local + n_site + s, load(increments, s))
     return (LAW_RANGE if beyond else 0) | (AMPLIFIER_CLIPPED if held != voltage else 0)
