@@ -26,12 +26,15 @@ from rig.loop.worker.probe import probe, round_trips
 from rig.loop.worker.queue_choice import DelayBounds, QueueChoice, presumed_latency, queue_of, settle_queue
 from rig.system.privileges import ordinary_scheduling, prepare
 from rig.tick.kernels import tick_block
+from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick, TickSettings
 
 SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
 COLLECTED_S, COLLECTED_CHUNKS = 120.0, 5
 """Rows of a loop on the device that wait for a late campaign at least, s, and chunks that it takes at a time; chosen: nothing
 hurries it, and on a busy computer it may get a twentieth of a processor."""
+COLLECTED_BYTES = 256 * 2**20
+"""Memory that these rows may take at most, bytes; chosen. Fewer seconds of them wait at high rates of many channels."""
 MEASUREMENTS: dict[str, Callable[..., object]] = {
     "probe": probe,
     "round trips": round_trips,
@@ -129,7 +132,7 @@ def _serve_on_device(
     _, settings, ring_s = _told(commands)
     tick = Tick(settings, 1.0 + daq.loop_latency_samples)
     tick.arrays, state = packed(tick.arrays)
-    layout = Layout.of(bench, tick.arrays, len(daq.counters), max(ring_s, COLLECTED_S), COLLECTED_CHUNKS)
+    layout = collecting_layout(bench, tick.arrays, len(daq.counters), ring_s)
     memory = SharedMemory(descriptor, layout, create=True)
     _ = tick.over  # loads its kernel
     came, _ = _listen()
@@ -149,6 +152,16 @@ def _serve_on_device(
     statistics = {"real_time": said | {"pacing": "device", "loop": "device"}, **daq.statistics}
     failure = None if loop.failure is None else described(loop.failure)
     facts.send(("ended", failure, collector.cause, dict(daq.counters), statistics))
+
+
+def collecting_layout(bench: Bench, arrays: TickArrays, n_counters: int, ring_s: float) -> Layout:
+    """Return the layout of the memory in which rows of a loop on the device wait, ``ring_s`` of them at least."""
+
+    def of(seconds: float) -> Layout:
+        return Layout.of(bench, arrays, n_counters, max(ring_s, seconds), COLLECTED_CHUNKS)
+
+    whole = of(COLLECTED_S)
+    return whole if whole.size <= COLLECTED_BYTES else of(COLLECTED_S * COLLECTED_BYTES / whole.size)
 
 
 def _queue_choice(

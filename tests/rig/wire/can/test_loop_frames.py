@@ -1,12 +1,14 @@
 """A loop on the device over CAN FD: what goes into frames comes out again, or is lost as a whole; the bus's load is the sum."""
 
 import zlib
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 from rig.errors import DaqRefused
+from rig.wire.can.bus import PythonCanBus
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import BusTiming, Frame, frame_seconds
 from rig.wire.can.link import CanLink, bus_load
@@ -139,6 +141,28 @@ def test_without_rows_in_its_frames_a_bus_says_so():
     link = CanLink(SlcanBus("/dev/null"), 4, BusTiming(fd=False))
     assert "5000 Hz x 48 bytes = 1.92 Mbit/s" in link.why_no_rows(Stream(4, 100, 5000.0, loop=True))
     assert CanLink(SlcanBus("/dev/null"), 4, BusTiming(fd=True)).why_no_rows(STREAM) == ""
+
+
+def test_over_a_backend_of_python_can_rows_states_and_records_arrive(request):
+    timing = BusTiming(fd=True)
+    host, device = (
+        CanLink(PythonCanBus("virtual", request.node.name, timing), N_CHANNELS, timing, 3, device=end)
+        for end in (False, True)
+    )
+    with ExitStack() as held:
+        for end in (host, device):
+            end.open()
+            held.callback(end.close)
+            end.speak(2)
+            end.configure(STREAM)
+        host.send(Record(5, 1000, bytes(range(100))))
+        pieces = [device.receive(1.0), device.receive(1.0)]
+        assert b"".join(piece.data for piece in pieces) == bytes(range(100))
+        assert [(piece.array, piece.offset) for piece in pieces] == [(5, 1000), (5, 1056)]
+        device.send(state_of(1))
+        device.send(block_of(1))
+        assert host.receive(1.0) == state_of(1)
+        require_block(host.receive(1.0), block_of(1))
 
 
 def test_outputs_are_no_part_of_such_a_stream():
