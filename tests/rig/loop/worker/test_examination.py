@@ -59,7 +59,8 @@ def late(made, late_s):
 
 def test_a_device_that_runs_the_loop_needs_no_queue_and_nothing_is_tried(examined, monkeypatch):
     monkeypatch.setattr("rig.loop.worker.examination.who_runs", lambda daq, bench: (True, ""))
-    bench = bench_with({"driver": {"name": "serial", "options": {**BENCH.driver.options, "loop": "device"}}})
+    options = {**BENCH.driver.options, "loop": "device"}
+    bench = BENCH.model_copy(update={"driver": BENCH.driver.model_copy(update={"options": options})})
     late(examined, 0.05)
     facts = examine_device(bench, 0)
     assert facts["block"] == 100
