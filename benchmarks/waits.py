@@ -137,6 +137,8 @@ def growth(folder: Path, most_twins: int) -> dict[str, dict[str, float]]:
 
 def _grown(commands: Iterable[tuple[float, str]], folder: Path) -> dict[str, float]:
     times = {size: used(rig(command), folder).processor_s for size, command in commands}
+    if len(times) < 2:
+        return {f"{size:g}": took for size, took in times.items()}
     (one, before), (two, after) = list(times.items())[-2:]
     return {
         **{f"{size:g}": took for size, took in times.items()},
