@@ -15,7 +15,7 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
 from rig.campaigns.evaluation.heavy_damping import with_heavy_damping
 from rig.campaigns.evaluation.images import with_images
-from rig.campaigns.evaluation.lost_samples import lost_rows
+from rig.campaigns.evaluation.lost_samples import lost_objection, lost_rows
 from rig.campaigns.evaluation.measured_together import Passage, round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
@@ -293,13 +293,14 @@ class Execution:
         bench, plan, out = self.bench, self.plan, []
         lost = int(lost_rows(rows).sum())  # a loop on the device knows nothing of those that were lost on the way here
         try:
-            IdentificationError.raise_if(lost == rows.size, f"all {lost} samples were lost in transmission")
             if self.kind.measure_batch is not None:
                 points = self.kind.measure_batch(bench, plan, targets, rows, passages, ended)
             else:
                 assert self.kind.measure is not None
                 points = [self.kind.measure(bench, plan, target, rows, settling) for target in targets]
-        except (IdentificationError, ArithmeticError) as error:
+        except (IdentificationError, ArithmeticError) as failure:
+            objection = lost_objection(lost, rows.size)
+            error = IdentificationError(objection) if objection else failure
             points = [not_evaluated(plan, target, error, self.settles) for target in targets]
             points = [replace(point, direction="both") for point in points] if self.batched else points
         kept = self.stored.row_range(first, first + rows.size)
