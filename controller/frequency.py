@@ -31,7 +31,8 @@ GAINS = {"phase": ("k1", "k2"), "frequency-error": ("frequency_proportional", "f
 """Settings that are kp and ki of each law."""
 
 FREQUENCY = record(
-    i8="law period_mean", f8="kp ki centre_rad_s lowest_rad_s highest_rad_s mode_shape_squared target_lag_rad dt_s"
+    i8="law period_mean feed_forward",
+    f8="kp ki centre_rad_s lowest_rad_s highest_rad_s mode_shape_squared target_lag_rad dt_s",
 )
 """Parameters of the frequency law (one record). ``target_lag_rad``: wanted lag where the plan names none."""
 
@@ -78,6 +79,10 @@ class FrequencySettings(Settings):
     """Whether the frequency follows the mean of the phase error over the last whole period, instead of every sample of it:
     the detector's ripple then no longer modulates the output, whose harmonics change those of the force."""
 
+    frequency_feed_forward: bool = False
+    """Whether the frequency changes with the level during a ramp, by the slope of the frequency over the level that the points
+    before have shown. The phase error then does not grow with the ramp's rate."""
+
     @model_validator(mode="after")
     def _frequency_possible(self) -> Self:
         lowest, highest = self.frequency_window_hz
@@ -121,6 +126,7 @@ class FrequencySettings(Settings):
         out["centre_rad_s"] = 2.0 * math.pi * self.centre_frequency_hz
         out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in self.frequency_window_hz)
         out["period_mean"] = self.period_mean
+        out["feed_forward"] = self.frequency_feed_forward
         out["mode_shape_squared"] = (drive_mode_shape or 0.0) ** 2
         out["target_lag_rad"] = math.radians(self.phase_lag_deg)
         out["dt_s"] = 1.0 / sample_rate_hz

@@ -8,6 +8,7 @@ import numpy as np
 
 from controller.amplitude import AMPLITUDE, AMPLITUDE_STATE, AmplitudeLaw, AmplitudeSettings, amplitude_state
 from controller.detector import DETECTOR, DETECTOR_STATE, VIBRATION, DetectorSettings, phase_error
+from controller.feed_forward import BACKBONE
 from controller.frequency import FREQUENCY, FREQUENCY_STATE
 from controller.harmonics.records import HARMONICS, HARMONICS_STATE
 from controller.harmonics.settings import HarmonicsSettings
@@ -34,6 +35,7 @@ CONTROL = np.dtype(
         ("detector", DETECTOR_STATE),
         ("rest", REST_STATE),
         ("frequency", FREQUENCY_STATE),
+        ("backbone", BACKBONE),
         ("amplitude", AMPLITUDE_STATE),
         ("harmonics", HARMONICS_STATE),
         ("lock", LOCK),

@@ -35,10 +35,10 @@ THRESHOLDS = record(
 )
 """Thresholds at which a lock is gained and lost (one record)."""
 
-LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods out_of_band gained")
+LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained", f8="slowing")
 """State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
-``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``out_of_band``: the error of the
-present period exceeds that at which ramps wait; ``gained``: there has been a lock before."""
+``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``gained``: there has been a lock before;
+``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower."""
 
 
 class LockRule(Settings):
@@ -53,7 +53,8 @@ class LockRule(Settings):
     lost_periods: int = Field(20, ge=1, le=1000)
     """Far periods in a row, at a held level, that lose a lock; or three times as many, less the close ones between them."""
     waiting_deg: float = Field(30.0, gt=0, le=180)
-    """Mean phase error of a period above which an upward ramp of the level waits, once there has been a lock."""
+    """Mean phase error of a period above which an upward ramp of the level waits, once there has been a lock, deg. From half of
+    it on the ramp is slower: its rate falls in proportion, to nothing at this error."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -86,7 +87,7 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     size = abs(error)
     if not present:
         lock.in_band_periods = 0
-        lock.out_of_band = 0
+        lock.slowing = 0.0
         if lock.state == LOCKED:
             lock.out_of_band_periods += 1
             if lock.out_of_band_periods >= thresholds.lost_periods:
@@ -97,7 +98,7 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     if lock.state == SEARCHING:
         lock.state = ACQUIRING
     lock.in_band_periods = lock.in_band_periods + 1 if size < thresholds.locked_rad else 0
-    lock.out_of_band = 1 if size > thresholds.waiting_rad else 0
+    lock.slowing = min(max(2.0 * size / thresholds.waiting_rad - 1.0, 0.0), 1.0)
     if not held:
         lock.net_out_of_band_periods = 0
     elif size > thresholds.lost_rad:

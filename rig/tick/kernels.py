@@ -8,10 +8,12 @@ import math
 
 import numpy as np
 
+from controller.feed_forward import add_to_backbone, follow_backbone, forget_backbone
 from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
 from controller.kernels import (
     ADAPTIVE,
     FORCE_RMS,
+    LOCKED,
     LOST as LOST_LOCK,
     TWO_PI,
     VOLTAGE,
@@ -128,6 +130,16 @@ def judge_by_exciter(t: TickArrays, seen: Record) -> None:
         shut_down(guard, EndReason.PLANT_CONTRADICTED, -1, ratio, loop.sample, False)
 
 
+@inner_kernel
+def note_backbone(t: TickArrays, level: float) -> None:
+    """Note the frequency of a ``level`` (V, N or m) held with a lock; forget all levels where there is none any more."""
+    control = t.control[0]
+    if level > 0.0:
+        add_to_backbone(control.backbone, level, t.law[0].frequency.centre_rad_s + control.frequency.integral)
+    else:
+        forget_backbone(control.backbone)
+
+
 @kernel
 def begin_segment(t: TickArrays, segment: Record) -> None:
     """Switch to the drive and amplitude law of a new segment, starting from the present output and frequency without a jump."""
@@ -147,6 +159,9 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
         measure_rms(t, segment.amplitude_law)
         progress.level = take_over(t.law[0].amplitude, amplitude, control.vibration, segment.amplitude_law)
         progress.kept_level = 0.0
+        forget_backbone(control.backbone)
+    if control.backbone.points == 0 and control.lock.state == LOCKED and is_ramp(segment.kind):
+        note_backbone(t, progress.level)  # the level of the start
 
 
 @inner_kernel
@@ -159,7 +174,10 @@ def step_sequencer(t: TickArrays) -> bool:
     progress.cycle = loop.cycles + loop.theta_in / TWO_PI
     missed = amplitude.saturated == 1 and held_amplitude(amplitude, t.control[0].vibration) < UNREACHED * progress.level
     progress.unreached = 1 if missed else 0
+    kept = progress.kept_level
     advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.control[0].lock, t.guard[0])
+    if progress.kept_level != kept:
+        note_backbone(t, progress.kept_level)
     running = t.guard[0].mode == GuardMode.ARMED and progress.finished == 0
     loop.held = 0
     if running and progress.entered == 1:
@@ -173,6 +191,10 @@ def step_sequencer(t: TickArrays) -> bool:
 def choose_frequency(t: TickArrays) -> None:
     """Set the frequency of this sample: from the loop (held while no phase can be read) or from the plan."""
     control, loop, progress = t.control[0], t.loop[0], t.progress[0]
+    if t.law[0].frequency.feed_forward == 1:
+        ramps = loop.drive == Drive.LOOP and loop.held == 0 and progress.returning == 0
+        follows = ramps and control.lock.state != LOST_LOCK and control.frequency.clamped == 0
+        follow_backbone(control.backbone, control.frequency, progress.level, follows)
     if loop.drive == Drive.WAVEFORM:
         control.frequency.omega = TWO_PI / (t.waveforms.shape[1] * loop.dt_s)
     elif loop.drive == Drive.TONE:

@@ -77,6 +77,8 @@ def plan_text(
         _line("low_pass_rad_s", significant(chosen.low_pass_rad_s)),
         _line("frequency_law", chosen.law),
         *_gains(chosen),
+        "# In a ramp the frequency changes with the level as from point to point before.",
+        _line("frequency_feed_forward", True),
         *_comment(f"Resonance of the structure alone as measured; {window.why}."),
         _line("centre_frequency_hz", significant(hertz, 6)),
         _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),

@@ -165,14 +165,13 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
 
 
 @kernel
-def must_wait(progress: Record, segment: Record, lock: Record) -> bool:
-    """Return whether an upward ramp waits because the phase of a loop that has been locked is off; sweeps do not."""
-    return bool(
-        segment.kind == SegmentKind.RAMP
-        and segment.drive == Drive.LOOP
-        and progress.unlocked == 0
-        and lock.out_of_band == 1
-    )
+def slowing(progress: Record, segment: Record, lock: Record) -> float:
+    """Return by how much of its rate (0 to 1) an upward ramp is slower, by the phase error of a loop that has been locked.
+
+    Sweeps of the level do not wait.
+    """
+    waits = segment.kind == SegmentKind.RAMP and segment.drive == Drive.LOOP and progress.unlocked == 0
+    return float(lock.slowing) if waits else 0.0
 
 
 @kernel
@@ -269,8 +268,8 @@ def advance(
 ) -> None:
     """Run the sequencer for one sample: set level, lag and frequency, move on after a segment, end the run after the last.
 
-    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached or the phase of a
-    loop that has been locked is off, an upward ramp waits. After a lost lock the next ramp begins where a lock was last held.
+    The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached an upward ramp
+    waits; while the phase of a loop that has been locked is off it is slower, or waits. After a lost lock the next ramp begins where a lock was last held.
     """
     if progress.finished:
         return
@@ -298,8 +297,8 @@ def advance(
     climbs = is_ramp(segment.kind) and segment.level > progress.level
     if climbs and progress.unreached == 1:
         progress.frozen_cycles += passed
-    elif climbs and must_wait(progress, segment, lock):
-        progress.waited_cycles += passed
+    elif climbs:
+        progress.waited_cycles += passed * slowing(progress, segment, lock)
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
         step_ramp(progress, segments, outcomes, settling, lock, guard, elapsed)

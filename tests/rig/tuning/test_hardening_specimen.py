@@ -1,11 +1,14 @@
 """A tuned plan on a beam with a spring at its tip that hardens it by several per cent, driven by a light exciter."""
 
+import math
+
 import numpy as np
 import pytest
 
 import rig
 from identification import nonlinear_mode
 from rig.bench import Bench
+from rig.tick.sequencer.layout import SegmentKind
 from rig.tuning import tune
 from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
@@ -73,10 +76,24 @@ def bench():
     )
 
 
+@pytest.fixture(scope="module")
+def plan(bench, tmp_path_factory):
+    return tune(bench, tmp_path_factory.mktemp("tuning") / "test.h5").plan
+
+
+def errors_in_ramps(part, segments):
+    """Largest mean phase error of a period, deg, in each ramp from one point to the next, and the periods of all of them."""
+    segment, theta = part.rows("segment"), part.rows("theta_rad")
+    period = np.concatenate([[0], np.cumsum(np.diff(theta) < -math.pi)])
+    error = np.degrees(np.nan_to_num(part.rows("phase_error_rad")))
+    mean = np.bincount(period, error) / np.bincount(period)
+    in_segment = segment[np.searchsorted(period, np.arange(len(mean)))]
+    ramps = [k for k, each in enumerate(segments) if each.kind == SegmentKind.RAMP and each.point > 0]
+    return [float(np.abs(mean[in_segment == k]).max()) for k in ramps], int(np.isin(in_segment, ramps).sum())
+
+
 @pytest.mark.slow
-def test_every_point_of_a_hardening_beam_is_accepted_and_on_the_curve_of_harmonic_balance(bench, tmp_path):
-    tuned = tune(bench, tmp_path / "test.h5")
-    plan = tuned.plan
+def test_every_point_of_a_hardening_beam_is_accepted_and_on_the_curve_of_harmonic_balance(bench, plan):
     with rig.run(plan, bench=bench, seed=1) as run:
         assert run.complete, run.recording.parts[-1].end
         mode = nonlinear_mode(run.backbone())
@@ -85,3 +102,18 @@ def test_every_point_of_a_hardening_beam_is_accepted_and_on_the_curve_of_harmoni
     assert mode.modal_frequency_hz == pytest.approx(truth.modal_frequency_hz, rel=5e-4)
     assert mode.damping_ratio == pytest.approx(truth.damping_ratio, rel=0.03)  # the lowest level has few bits
     assert np.all(np.diff(mode.modal_frequency_hz) > 0.0)
+
+
+@pytest.mark.slow
+def test_ramps_keep_the_phase_because_the_frequency_follows_the_points_before(bench, plan):
+    found = []
+    for follows in (True, False):
+        controller = plan.controller.model_copy(update={"frequency_feed_forward": follows})
+        with rig.run(plan.model_copy(update={"controller": controller}), bench=bench, seed=1) as run:
+            assert run.complete
+            found.append(errors_in_ramps(run.recording.parts[-1], plan.segments(bench.sample_rate_hz)))
+    (errors, periods), (without, waiting) = found
+    assert plan.controller.frequency_feed_forward
+    assert max(errors) < 10.0
+    assert max(without) > 15.0  # they ran into their own lag, and waited
+    assert periods < waiting

@@ -204,32 +204,39 @@ def test_a_ramp_up_that_waits_for_twenty_periods_is_out_of_reach_and_skips_its_p
 def test_a_ramp_up_waits_while_the_phase_of_a_locked_loop_is_off():
     walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0)).go(6)
     waiting = walk.levels[-1]
-    walk.lock["out_of_band"] = 1
+    walk.lock["slowing"] = 1
     walk.go(15)
     assert walk.levels[-1] == pytest.approx(waiting, abs=0.02)
     assert walk.progress["waited_cycles"][0] == pytest.approx(15.0, abs=0.1)
-    walk.lock["out_of_band"] = 0
+    walk.lock["slowing"] = 0
     walk.go(5.9)
     assert walk.codes() == ["DONE", "DONE"]
     assert walk.levels[-1] == 3.0
 
 
+def test_a_ramp_up_is_slower_in_proportion_to_its_phase_error():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0))
+    walk.lock["slowing"] = 0.75
+    assert walk.go(40.9).codes() == ["DONE", "RUNNING"]
+    assert walk.go(0.2).codes() == ["DONE", "DONE"]
+
+
 def test_before_the_first_lock_no_ramp_waits_for_the_phase():
     walk = Walk(_ramp(3.0, 10.0))
-    walk.lock["state"], walk.lock["out_of_band"], walk.progress["unlocked"] = LockState.ACQUIRING, 1, 1
+    walk.lock["state"], walk.lock["slowing"], walk.progress["unlocked"] = LockState.ACQUIRING, 1, 1
     assert walk.go(10.1).codes() == ["DONE"]
 
 
 @pytest.mark.parametrize(("kind", "on_the_way"), [(SegmentKind.LEVEL_SWEEP, 3.0), (SegmentKind.RAMP, 0.5)])
 def test_neither_a_sweep_of_the_level_nor_a_ramp_down_waits_for_the_phase(kind, on_the_way):
     walk = Walk(_held(1.0, 1.0), Segment(kind, 0, on_the_way, 10.0, amplitude_law=AmplitudeLaw.RESPONSE))
-    walk.lock["out_of_band"] = 1
+    walk.lock["slowing"] = 1
     assert walk.go(11.1).codes() == ["DONE", "DONE"]
 
 
 def test_a_ramp_that_waits_in_vain_has_lost_the_lock():
     walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0, point=0, on_lost_lock=OnFailure.SKIP), *_point(1, 4.0)).go(6)
-    walk.lock["out_of_band"] = 1
+    walk.lock["slowing"] = 1
     assert walk.go(199.0).codes()[1] == "RUNNING"
     assert walk.go(2.0).codes()[1] == "LOST_LOCK"
 

@@ -1,0 +1,57 @@
+"""Feed-forward of the frequency along the backbone: while the level changes, the oscillator changes with it.
+
+The frequency of phase resonance over the level is the parabola through the last three levels that were held with a lock (a line
+through two, nothing for one; Newton's divided differences). What it misses is left to the PI law, whose integral it moves.
+"""
+
+from vibrolock.arrays import record
+from vibrolock.compiled import Record, inner_kernel
+
+BACKBONE = record(i8="points", f8="level level_1 omega_1 level_2 omega_2 level_3 omega_3")
+"""The last levels held with a lock (one record). ``level_1``, ``omega_1`` (rad/s): the last of ``points`` up to three;
+``level``: the level at the last sample, in the unit of the plan's levels."""
+
+LARGEST_RATIO = 3.0  # of the slope to that between the last two levels: the parabola is not believed beyond
+
+
+@inner_kernel
+def forget_backbone(state: Record) -> None:
+    """Forget the levels, whose unit changes."""
+    state.points = 0
+
+
+@inner_kernel
+def add_to_backbone(state: Record, level: float, omega: float) -> None:
+    """Add the frequency ``omega`` (rad/s) of a level held with a lock; a level held again replaces its earlier frequency."""
+    if state.points > 0 and level == state.level_1:
+        state.omega_1 = omega
+        return
+    state.level_3, state.omega_3 = state.level_2, state.omega_2
+    state.level_2, state.omega_2 = state.level_1, state.omega_1
+    state.level_1, state.omega_1 = level, omega
+    state.points = min(state.points + 1, 3)
+
+
+@inner_kernel
+def backbone_slope(state: Record, level: float) -> float:
+    """Return the change of frequency for the level, rad/s per unit of the level, at ``level``.
+
+    It has the sign of the slope between the last two levels, and at most `LARGEST_RATIO` times its size.
+    """
+    if state.points < 2:
+        return 0.0
+    slope = (state.omega_1 - state.omega_2) / (state.level_1 - state.level_2)
+    if state.points < 3 or slope == 0.0 or state.level_3 in (state.level_1, state.level_2):
+        return float(slope)
+    earlier = (state.omega_2 - state.omega_3) / (state.level_2 - state.level_3)
+    curvature = (slope - earlier) / (state.level_1 - state.level_3)
+    ratio = 1.0 + curvature * (2.0 * level - state.level_1 - state.level_2) / slope
+    return float(slope * min(max(ratio, 0.0), LARGEST_RATIO))
+
+
+@inner_kernel
+def follow_backbone(state: Record, frequency: Record, level: float, ramps: bool) -> None:
+    """Move the integral of the frequency law for the change of the level since the last sample, if the level ``ramps``."""
+    if ramps:
+        frequency.integral += backbone_slope(state, 0.5 * (level + state.level)) * (level - state.level)
+    state.level = level
