@@ -37,8 +37,8 @@ THRESHOLDS = record(
 
 LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained", f8="slowing")
 """State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
-``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``gained``: there has been a lock before;
-``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower."""
+``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``gained``: there has been a lock
+before; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower."""
 
 
 class LockRule(Settings):

@@ -269,7 +269,8 @@ def advance(
     """Run the sequencer for one sample: set level, lag and frequency, move on after a segment, end the run after the last.
 
     The caller has set ``sample``, ``cycle`` and ``unreached`` of ``progress``. While the level is unreached an upward ramp
-    waits; while the phase of a loop that has been locked is off it is slower, or waits. After a lost lock the next ramp begins where a lock was last held.
+    waits; while the phase of a loop that has been locked is off it is slower, or waits. After a lost lock the next ramp begins
+    where a lock was last held.
     """
     if progress.finished:
         return
