@@ -29,6 +29,7 @@ REALISATIONS = 3  # of the last multisine
 PERIODS = 2  # of each realisation that are evaluated
 TRANSIENT_PERIODS = 1
 PLAYED_PERIODS = PERIODS + TRANSIENT_PERIODS
+REFINEMENT = 8.0  # of the spacing of the lines where those of the search show no resonance; chosen
 MAX_REFINEMENT = 32.0  # most by which the spacing of the lines is reduced after the search
 GOOD_COHERENCE = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
 MIN_COHERENCE = 0.9  # least coherence of a level chosen by the user, or of the highest that the limits allow
@@ -96,8 +97,8 @@ def measure(
         runs.listen(level_rms_v)
         tried = (level_rms_v,)
         _audible(bench, level_rms_v, runs.coherence, "at the level asked for")
-    matrix = voltage_responses(bench, runs.measured)
-    resolution = 2.0 * damping_of(matrix, runs.lead_samples) * bench.specimen.linear_frequency_hz / LINES_PER_BANDWIDTH
+    damping_ratio = _damping(runs, tried[-1], damping_of)
+    resolution = 2.0 * damping_ratio * bench.specimen.linear_frequency_hz / LINES_PER_BANDWIDTH
     # the damping of a resonance between two lines is a guess
     resolution = max(resolution, _coarse(bench) / MAX_REFINEMENT)
     found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), REALISATIONS)
@@ -117,6 +118,18 @@ def measure(
         levels_tried_v=tried,
         share_of_limits=runs.share_of_limits,
     )
+
+
+def _damping(runs: "_Runs", level_rms_v: float, damping_of: Callable[[FrequencyResponseMatrix, float], float]) -> float:
+    """Damping ratio from the responses of the search; where these show none, from one realisation of finer lines.
+
+    A light resonance lies between two lines of the search.
+    """
+    try:
+        return damping_of(voltage_responses(runs.bench, runs.measured), runs.lead_samples)
+    except TuningError:
+        found = runs.at(level_rms_v, _on_samples(runs.bench, _coarse(runs.bench) / REFINEMENT), 1)
+        return damping_of(voltage_responses(runs.bench, found), runs.lead_samples)
 
 
 def expected_duration(bench: Bench, *, by_the_clock: bool) -> str:

@@ -1,0 +1,48 @@
+"""Resolution of the multisine of a tuning: what follows where the lines of the search show no resonance."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from rig.tuning import linear_test
+from rig.tuning.linear_test import LINES, REFINEMENT
+from rig.tuning.plant import TuningError
+from tests.rig.rigs import bench_with
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    monkeypatch.setattr(linear_test, "voltage_responses", lambda bench, measured: measured)
+    bench, played = bench_with({"specimen": {"linear_frequency_hz": 25.0}}), []
+
+    def at(level_rms_v, resolution_hz, realisations):
+        played.append((level_rms_v, resolution_hz, realisations))
+        return "finer"
+
+    return SimpleNamespace(bench=bench, measured="coarse", lead_samples=2.0, at=at, played=played)
+
+
+def test_a_resonance_between_two_lines_of_the_search_is_looked_for_with_finer_ones(runs):
+    def damping_of(responses, lead_samples):
+        if responses == "coarse":
+            raise TuningError("no mode")
+        return 3e-4
+
+    assert linear_test._damping(runs, 0.02, damping_of) == 3e-4
+    [(level, resolution, realisations)] = runs.played
+    assert (level, realisations) == (0.02, 1)
+    assert resolution == pytest.approx(25.0 / LINES / REFINEMENT, rel=1e-3)
+
+
+def test_where_the_search_shows_the_resonance_nothing_further_is_played(runs):
+    assert linear_test._damping(runs, 0.02, lambda responses, lead: 0.01) == 0.01
+    assert runs.played == []
+
+
+def test_a_rig_without_a_mode_is_refused_after_the_finer_lines(runs):
+    def damping_of(responses, lead_samples):
+        raise TuningError("no mode")
+
+    with pytest.raises(TuningError, match=r"^no mode$"):
+        linear_test._damping(runs, 0.02, damping_of)
+    assert len(runs.played) == 1
