@@ -131,7 +131,7 @@ def test_random_errors_are_those_of_runs_that_differ_by_noise_alone() -> None:
         values = np.array([getattr(run, name) for run in runs])
         stated = np.sqrt(np.mean([run.random(name) ** 2 for run in runs], axis=0))
         ratio = np.sqrt(np.mean(np.var(values, axis=0, ddof=1) / stated**2))
-        assert 0.6 < ratio < 1.25, name
+        assert 0.5 < ratio < 1.25, name  # of 24 runs 0.65 to 0.9; of eight it scatters by some 0.1
 
 
 @pytest.mark.slow
