@@ -30,7 +30,7 @@ from tests.rig.rigs import bench_with
 
 LATE = {"held_per_s": 0.3, "held_s": 0.014}
 ALWAYS = {"held_per_s": 0.5, "held_s": 0.014}  # eight in a record of 400 periods, on average
-NO_TOLERANCE = {"accepted_phase_error_deg": 0.001}
+NO_TOLERANCE = {"accepted_phase_error_deg": 1e-6}
 
 
 def late_bench(faults, **changes):
