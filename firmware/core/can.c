@@ -95,7 +95,7 @@ static void send_samples(const struct vl_samples *samples)
 {
     was_given_up = false;
     block = samples;
-    if (samples->is_of_loop) {
+    if (vl_has_loop()) {
         vl_can_send_rows(samples);
         return;
     }
@@ -158,7 +158,7 @@ static void make_samples(struct vl_frame *frame)
 
 static void make_frame(struct vl_frame *frame)
 {
-    if (block->is_of_loop)
+    if (vl_has_loop())
         vl_can_frame_of_rows(frame);
     else if (read_back < vl_in_force.block)
         make_readback(frame);
@@ -168,7 +168,7 @@ static void make_frame(struct vl_frame *frame)
 
 static void next_frame(void)
 {
-    if (block->is_of_loop) {
+    if (vl_has_loop()) {
         if (!vl_can_next_of_rows())
             block = NULL;
         return;
@@ -195,7 +195,7 @@ static bool is_idle(void)
         else
             make_frame(&frame);
         if (!board_send_frame(&frame)) {
-            if (board_clock_us() < expires_us || (block && block->is_of_loop))
+            if (board_clock_us() < expires_us || (block && vl_has_loop()))
                 return false;
             was_given_up = block != NULL;
             block = NULL;

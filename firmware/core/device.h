@@ -85,8 +85,7 @@ struct vl_samples {
     uint8_t flags;
     const uint8_t *counts;
     const uint8_t *put_out; /* counts of the converter, where an output was missing; NULL: as handed over */
-    bool is_of_loop;        /* on the device: `counts` are readings and rows */
-    const uint8_t *state;   /* of that loop, after the block */
+    const uint8_t *state;   /* of the loop on the device, after the block: `counts` are readings and rows then */
     uint32_t state_bytes;   /* 0: none is told with this block */
 };
 

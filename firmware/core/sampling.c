@@ -225,7 +225,6 @@ static void end_block(void)
             .flags = (uint8_t)(seen | vl_latched()),
             .counts = block,
             .put_out = keep_readback(block + block_bytes),
-            .is_of_loop = vl_has_loop(),
             .state = behind,
             .state_bytes = vl_has_loop() ? vl_tick_state(behind) : 0,
         };

@@ -106,7 +106,7 @@ static void put_samples(const struct vl_samples *samples)
     uint8_t head[SAMPLES_HEAD - HEADER] = {0};
     vl_put(vl_put(vl_put(head, samples->first, 8), samples->clock_us, 8), samples->dropped, 4);
     head[20] = samples->flags;
-    begin_frame(samples->is_of_loop ? VL_ROWS : SAMPLES, block_number(samples));
+    begin_frame(vl_has_loop() ? VL_ROWS : SAMPLES, block_number(samples));
     put(head, sizeof head);
     put(samples->counts, vl_in_force.block * vl_row_bytes(&vl_in_force));
     end_frame();
