@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from identification.models.pnlss.error_table import SAME_LEVEL as SAME_LEVEL, ModelTest as ModelTest
     from identification.models.pnlss.features import FUNCTIONS as FUNCTIONS
     from identification.models.pnlss.user_functions import is_users as is_users
+    from identification.models.simulated_runs import run_of as run_of
     from identification.models.structured.fit import drawn as drawn, std_of as std_of
     from identification.models.structured.identified import FittedNumber as FittedNumber
     from identification.models.structured.laws import (
@@ -30,6 +31,11 @@ if TYPE_CHECKING:
         Spring as Spring,
         Stop as Stop,
         UserSpring as UserSpring,
+    )
+    from identification.models.structured.open_quantities import (
+        check_input as check_input,
+        peak_band as peak_band,
+        run_band as run_band,
     )
     from identification.models.structured.regression import law_force as law_force
     from identification.models.structured.start import linear_start as linear_start

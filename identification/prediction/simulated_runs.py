@@ -53,6 +53,11 @@ class SimulatedRun:
     over_noise
         float[n_outputs], RMS of the residual over that of the noise in the excited lines
         (`identification.experiments.residuals.residual_over_noise`); NaN where the noise is unknown.
+    rms_band, peak_band
+        float[2, n_outputs], ends of 95 % intervals of ``rms`` and ``peak``; NaN if unknown.
+    error_band
+        float[n_outputs], relative RMS error that is not exceeded in 95 % of cases, by what the model's data leave open; NaN if
+        unknown.
     """
 
     name: str
@@ -65,11 +70,16 @@ class SimulatedRun:
     rms: Float = field(default_factory=_unknown)
     peak: Float = field(default_factory=_unknown)
     over_noise: Float = field(default_factory=_unknown)
+    rms_band: Float = field(default_factory=_unknown)
+    peak_band: Float = field(default_factory=_unknown)
+    error_band: Float = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         count = len(self.outputs)
-        _shape(self, ("error", "rms", "peak", "over_noise"), (count,), f"one for each of {count} outputs")
+        each = ("error", "rms", "peak", "over_noise", "error_band")
+        _shape(self, each, (count,), f"one for each of {count} outputs")
+        _shape(self, ("rms_band", "peak_band"), (2, count), f"two for each of {count} outputs")
 
     @property
     def bounded(self) -> bool:
@@ -78,10 +88,15 @@ class SimulatedRun:
 
     def row(self) -> dict[str, object]:
         """Return JSON-able numbers by name; None for numbers that are unknown or not finite."""
-        errors, rms, peak, over_noise = (
+        errors, rms, peak, over_noise, at_most = (
             {name: _finite(value) for name, value in zip(self.outputs, values, strict=True)}
-            for values in (self.error, self.rms, self.peak, self.over_noise)
+            for values in (self.error, self.rms, self.peak, self.over_noise, self.error_band)
         )
+        bands = {
+            what: {name: [_finite(end) for end in ends] for name, ends in zip(self.outputs, values.T, strict=True)}
+            for what, values in (("rms_band", self.rms_band), ("peak_band", self.peak_band))
+            if np.isfinite(values).any()
+        }
         return {
             "name": self.name,
             "use": self.use,
@@ -90,6 +105,8 @@ class SimulatedRun:
             "rms": rms,
             "peak": peak,
             "over_noise": over_noise,
+            **bands,
+            **({"error_band": at_most} if bands else {}),
             "range_use": _finite(self.range_use),
             "unbounded": not self.bounded,
             "unbounded_at_s": self.unbounded_at_s,

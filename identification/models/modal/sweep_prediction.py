@@ -41,6 +41,8 @@ class SweepPrediction(Result):
         training data; inf for an unbounded run. None for nonlinear modes.
     unbounded_at_s
         Time at which the simulated run became unbounded, before which the prediction ends; None if it stayed bounded.
+    peak_band_m, peak_band_hz
+        Ends of the 95 % intervals of the largest displacement of the drive point and of its frequency; None if unknown.
     """
 
     time_s: Float
@@ -56,6 +58,8 @@ class SweepPrediction(Result):
     notes: tuple[str, ...] = ()
     simulated_range_use: float | None = None
     unbounded_at_s: float | None = None
+    peak_band_m: tuple[float, float] | None = None
+    peak_band_hz: tuple[float, float] | None = None
 
     @property
     def range_use(self) -> float:

@@ -26,6 +26,7 @@ from identification.linear.subspace import StateSpace
 from identification.models.structured.model import Motion, StructuredModel, motion_of, workspace_for
 from identification.models.structured.nudging import ends_of_steps
 from identification.models.structured.steps import System, Workspace, accelerate, dot, end_step, take_input, take_step
+from identification.models.structured.trained_range import input_use
 from identification.validation import finite_array
 from vibrolock.arrays import Float
 from vibrolock.compiled import inner_kernel, unlocked_kernel
@@ -70,6 +71,8 @@ def coupled_run(
     found = motion_of(model, force[None], states, int(work.unsolved[0]))
     notes = (*coarser, *passes.notes(reached, repeats, change))
     with_exciter = {"force_n": force, "passes": repeats, "change": change, "notes": notes}
+    if np.isfinite(force).all():
+        with_exciter["input_use"] = np.array([input_use(model, force, settled=False)])
     return CoupledMotion(**(vars(found) | with_exciter))
 
 

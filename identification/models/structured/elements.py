@@ -44,6 +44,8 @@ class NonlinearElement:
         Largest ``|x|`` of springs and dampers.
     largest
         Largest ``|x|`` in the training data; None if unknown.
+    driven
+        How far the forces of the training data drive the element (`trained_range.driven`), over ``largest``; None if unknown.
     between
         Outputs between which, or at which, the element acts; empty if its direction was found.
     """
@@ -53,6 +55,7 @@ class NonlinearElement:
     laws: tuple[Law, ...]
     reach: float = 3.0
     largest: float | None = None
+    driven: float | None = None
     between: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -60,8 +63,9 @@ class NonlinearElement:
         convert_fields(self, tuple, "laws", "between")
         for name in ("scale_m", "reach"):
             object.__setattr__(self, name, positive(f"element: {name}", getattr(self, name)))
-        if self.largest is not None:
-            object.__setattr__(self, "largest", float(self.largest))
+        for name in ("largest", "driven"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, float(getattr(self, name)))
         IdentificationError.raise_if(not self.laws, "laws is empty", field="element", allowed="one at least")
 
     @property

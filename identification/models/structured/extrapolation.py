@@ -1,8 +1,6 @@
 """Predictions beyond the training data: how far the input goes there, and bands that hold what the data leave open.
 
-The model's own motion does not tell how far a prediction goes: a model that is too stiff or too damped there moves too little.
-The input does (`input_use`): the force over the one that moves the structure through the range of the training data, with the
-stiffness and the damping that the elements have there.
+How far a prediction goes is told by its input (`trained_range`), not by the model's own motion.
 """
 
 from collections.abc import Callable
@@ -12,21 +10,15 @@ import numpy as np
 
 from identification.errors import ExtrapolationError, IdentificationError
 from identification.models.structured.alternatives import alternatives
-from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.fit import StructuredFit
-from identification.models.structured.hysteresis import joint_forces
 from identification.models.structured.model import StructuredModel
+from identification.models.structured.trained_range import trained_force_n
 from identification.prediction.steady_prediction import ResponseBand, SteadyPrediction, widened
-from vibrolock.arrays import Complex, Float
 
 LARGEST_INPUT_USE = 2.0
 """Input up to which bands are given, over that of the training data."""
-_ROUNDING = 1.01
-_PHASES = 512
-"""Samples of the period over which an element's stiffness and damping are averaged. Chosen."""
-_AROUND = np.linspace(-2.0, 2.0, 41)
-"""Distances from a resonance at which the response is looked for, over half its bandwidth. Chosen."""
-_AMPLITUDE, _FREQUENCY = (2.0, 10.0), (8.0, 100.0)
+ROUNDING = 1.01
+AMPLITUDE, FREQUENCY = (2.0, 24.0), (8.0, 100.0)
 """Error of amplitude, over that of the training, and of frequency, over the same times the damping ratio, at the level of
 the training data, and what is added at twice that level. Chosen on wrong laws with training errors of 0.3 to 4 % (hysteresis
 of Bouc and Wen by Masing's rule, joints and a stop by polynomials): so far they were off beyond what alternatives explain."""
@@ -34,52 +26,7 @@ _LARGEST_SPAN, _LARGEST_SHIFT = 2.0, 1.2
 """Upper end of a band of amplitude and of frequency over the lower end, above which a prediction is refused. Chosen."""
 
 
-def secant(element: NonlinearElement) -> tuple[float, float, float]:
-    """Return stiffness (J), loss per cycle as an imaginary stiffness (J) and damping (J s) of a sine over the trained range.
-
-    Those of the first harmonic of the force. The range is that of the laws where that of the training is unknown.
-    """
-    x = float(element.largest or element.reach)
-    theta = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
-    along = x * np.sin(theta)  # from rest at 0: a hysteresis remembers where it began
-    force = np.interp(along, element.nodes, element.spring(element.laws)[0])
-    sliding = np.zeros(_PHASES)
-    joint_forces(element.sliders(element.laws), element.bends(element.laws), along, sliding)
-    whole = (2.0 / (_PHASES * x)) * np.sum((force + sliding) * (np.sin(theta) + 1j * np.cos(theta)))
-    damping = np.interp(along, element.nodes, element.damper(element.laws))
-    return float(whole.real), float(whole.imag), float(2.0 * np.mean(damping * np.cos(theta) ** 2))
-
-
-def trained_force_n(model: StructuredModel, lowest_hz: float, highest_hz: float) -> float:
-    """Return the peak of a sine that moves an element through its trained range at a resonance in a band; NaN if there is none.
-
-    By the equation of motion with the stiffness and damping of `secant`.
-    """
-    phi = np.array([one.phi for one in model.elements]).reshape(len(model.elements), len(model.omega))
-    if not len(phi) or not all(one.largest for one in model.elements):
-        return float("nan")
-    stiff, loss, damping = np.array([secant(one) for one in model.elements]).T
-    stiffness = np.diag(model.omega**2) + (phi.T * (stiff + 1j * loss)) @ phi
-    rates = np.diag(2.0 * model.damping_ratio * model.omega) + (phi.T * damping) @ phi
-    squares, shapes = np.linalg.eigh(stiffness.real)
-    least = np.inf
-    for square, shape in zip(squares, shapes.T, strict=True):
-        if square <= 0.0 or not lowest_hz <= (at := float(np.sqrt(square))) / (2.0 * np.pi) <= highest_hz:
-            continue
-        half = 0.5 * (float(shape @ rates @ shape) + float(shape @ stiffness.imag @ shape) / at)
-        for omega in at + half * _AROUND:
-            moved = _response(stiffness, rates, model.input_shapes[:, 0], float(omega))
-            use = np.max(np.abs(phi @ moved) / np.array([float(one.largest or 1.0) for one in model.elements]))
-            least = min(least, 1.0 / float(use))
-    return least if np.isfinite(least) else float("nan")
-
-
-def _response(stiffness: Complex, rates: Float, pushed: Float, omega: float) -> Complex:
-    dynamic = stiffness - omega**2 * np.eye(len(pushed)) + 1j * omega * rates
-    return np.asarray(np.linalg.solve(dynamic, pushed.astype(complex)))
-
-
-def input_use(model: StructuredModel, response: SteadyPrediction) -> float:
+def response_use(model: StructuredModel, response: SteadyPrediction) -> float:
     """Return the force at the peak of a response over `trained_force_n`; NaN if that is unknown."""
     frequency_hz = response.frequency_hz
     known = trained_force_n(model, 0.5 * float(np.min(frequency_hz)), 2.0 * float(np.max(frequency_hz)))
@@ -88,7 +35,7 @@ def input_use(model: StructuredModel, response: SteadyPrediction) -> float:
 
 def judged_by_input(model: StructuredModel, response: SteadyPrediction) -> SteadyPrediction:
     """Return a response whose range use is that of its force, where this is above 1 and above that of its motion."""
-    use, own = input_use(model, response), float(np.nanmax(response.range_use, initial=0.0))
+    use, own = response_use(model, response), float(np.nanmax(response.range_use, initial=0.0))
     if not use > max(own, 1.0) or own == 0.0:
         return response
     said = (
@@ -118,10 +65,10 @@ def with_what_is_open(
     respond
         The same response of another model, however far it goes.
     """
-    use = input_use(fit.model, response)
+    use = response_use(fit.model, response)
     if not response.peak_reached():
         raise _refused(response, use, "its model leaves the range that is allowed before the peak")
-    if use > LARGEST_INPUT_USE * _ROUNDING:
+    if use > LARGEST_INPUT_USE * ROUNDING:
         raise _refused(response, use, f"above {LARGEST_INPUT_USE:g} nothing is known of the error")
     families: dict[str, list[SteadyPrediction]] = {}
     for family, model in alternatives(fit.model):
@@ -130,7 +77,7 @@ def with_what_is_open(
         except IdentificationError:
             raise _refused(response, use, f"a {family} that fits these data as well has no such response") from None
     beyond = max(use - 1.0, 0.0) if np.isfinite(use) else 0.0
-    amplitude, frequency = (fit.training_error * (one + more * beyond) for one, more in (_AMPLITUDE, _FREQUENCY))
+    amplitude, frequency = (fit.training_error * (one + more * beyond) for one, more in (AMPLITUDE, FREQUENCY))
     found = widened(band, response, list(families.values()), amplitude, frequency * _damping_ratio(fit.model, response))
     top = int(np.argmin(np.abs(found.phase_lag_deg - 90.0)))
     (low, high), (low_hz, high_hz) = found.amplitude_m[:, top], found.frequency_hz[:, top]

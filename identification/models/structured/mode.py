@@ -16,6 +16,7 @@ from identification.models.structured.balance import StructuredBalance
 from identification.models.structured.dynamics import StructuredDynamics
 from identification.models.structured.fit import StructuredFit, std_of
 from identification.models.structured.model import StructuredModel
+from identification.models.structured.open_backbone import BackboneCurve, with_open_laws
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.nonlinear.properties import States, properties
 from vibrolock.arrays import Float
@@ -48,10 +49,12 @@ def structured_mode(
     fundamental; the modal amplitude refers to the small vibrations (`StructuredModel.linearised`).
 
     Standard errors are those of frequency and damping at the same amplitude, from the covariance of the fit, to first order
-    (`std_of`). They are NaN for a model without its fit, and contain neither the misfit of the
-    laws nor that of the modes.
+    (`std_of`). They are NaN for a model without its fit. Where the force is above that of the training data they also hold laws
+    that the data leave open there and the error that the fit left (`with_open_laws`); below they contain neither the misfit of
+    the laws nor that of the modes.
 
-    Raises `IdentificationError` if ``force_n`` is needed because the model does not know its training data, and as
+    Raises `ExtrapolationError` for a force above twice that of the training data or laws that differ too much there, and
+    `IdentificationError` if ``force_n`` is needed because the model does not know its training data, and as
     `identification.backbone` does.
 
     Parameters
@@ -68,18 +71,11 @@ def structured_mode(
     model = found.model if isinstance(found, StructuredFit) else found
     row = find_role(model.outputs, "drive")
 
+    how: dict[str, Any] = {"force": force, "exciter": exciter, "support": support, "harmonics": harmonics}
+    how |= {"samples": samples, "near_hz": near_hz}
+
     def backbone(force_n: float, largest_use: float) -> Resonances:
-        request = SteadyRequest(
-            level=force_n,
-            held=force,
-            exciter=exciter,
-            support=support,
-            harmonics=harmonics,
-            samples=samples,
-            points=_MOST_POINTS,
-            largest_range_use=largest_use,
-        )
-        return StructuredDynamics(model).resonances(request, near_hz)
+        return _backbone(model, force_n, largest_use, **how)
 
     path = _within_training(model, backbone, row, near_hz) if force_n is None else backbone(force_n, np.inf)
     if force_n is not None and path.reason:
@@ -109,6 +105,11 @@ def structured_mode(
     relative = np.full((2, states.count), np.nan)
     if isinstance(found, StructuredFit):
         relative = std_of(found, lambda other: _at_amplitudes(path, other, row, near_hz))
+        if force_n is not None:
+            curve = BackboneCurve.of(path)
+            relative = with_open_laws(
+                found, curve, relative, lambda m, largest_n: BackboneCurve.of(_backbone(m, largest_n, np.inf, **how))
+            )
     return NonlinearMode(
         **values,
         modal_frequency_std_hz=relative[0] * values["modal_frequency_hz"],
@@ -127,6 +128,31 @@ def structured_mode(
         drive_mode_shape=shape,
         drive_mode_shape_source="small vibrations of the structured model",
     )
+
+
+def _backbone(
+    model: StructuredModel,
+    force_n: float,
+    largest_use: float,
+    *,
+    force: Held,
+    exciter: Exciter | None,
+    support: bool,
+    near_hz: float | None,
+    harmonics: int,
+    samples: int | None,
+) -> Resonances:
+    request = SteadyRequest(
+        level=force_n,
+        held=force,
+        exciter=exciter,
+        support=support,
+        harmonics=harmonics,
+        samples=samples,
+        points=_MOST_POINTS,
+        largest_range_use=largest_use,
+    )
+    return StructuredDynamics(model).resonances(request, near_hz)
 
 
 def _tested(model: StructuredModel, near_hz: float | None) -> tuple[StructuredModel, int]:

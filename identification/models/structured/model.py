@@ -19,6 +19,7 @@ from identification.models.structured.nudging import (
     with_lead_in_periods,
 )
 from identification.models.structured.steps import System, Workspace, run
+from identification.models.structured.trained_range import driven_displacements, input_use
 from identification.validation import convert_fields, finite_array, positive, shaped_array
 from vibrolock.arrays import Float
 from vibrolock.results import Result
@@ -194,7 +195,8 @@ class StructuredModel(Result):
         u = finite_array("inputs", inputs, np.float64, 2)
         if len(u) != len(self.inputs):
             raise IdentificationError(f"shape {u.shape}", field="inputs", allowed=f"{len(self.inputs)} rows")
-        return self.run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
+        found = self.run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
+        return replace(found, input_use=np.array([input_use(self, u[0], settled=False)]))
 
     def run(self, stretches: Sequence[tuple[System, int, int]], u: Float, ends: Float, counted_from: int = 0) -> Motion:
         """Simulate from rest, with a system from sample to sample; a frozen support is updated after each stretch."""
@@ -224,7 +226,8 @@ class StructuredModel(Result):
         run_of = self.run(nudging.stretches(self.system), longer.inputs, nudging.ends, longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         cut = {name: getattr(run_of, name)[:, kept] for name in ("outputs", "states", "acceleration")}
-        return replace(run_of, **cut, unbounded_at=first_unbounded(cut["outputs"]))
+        by_input = np.array([input_use(self, experiment.counted_inputs[0], settled=True)])
+        return replace(run_of, **cut, input_use=by_input, unbounded_at=first_unbounded(cut["outputs"]))
 
     def with_half_steps(self) -> "StructuredModel":
         """Return the model with steps of half the length, which tells the errors of the steps (Richardson)."""
@@ -260,10 +263,17 @@ class StructuredModel(Result):
         )
 
     def trained_with(self, experiments: Sequence[Experiment]) -> "StructuredModel":
-        """Return the model with the largest displacements of its elements in ``experiments``."""
+        """Return the model with the largest displacements of its elements in ``experiments``, and how far their forces go."""
         use = np.max([self.simulate_experiment(one).reach_use for one in experiments], axis=0)
         known = zip(self.elements, use.tolist(), strict=True)
-        return replace(self, elements=tuple(replace(e, largest=share * e.reach) for e, share in known))
+        moved = replace(self, elements=tuple(replace(e, largest=share * e.reach) for e, share in known))
+        forces = [(one, one.period_samples > 0) for one in experiments]
+        driven = [
+            driven_displacements(moved, (one.counted_inputs if settled else one.inputs)[0], settled=settled)
+            for one, settled in forces
+        ]
+        most = zip(moved.elements, np.max(driven, axis=0).tolist(), strict=True)
+        return replace(moved, elements=tuple(replace(e, driven=x) for e, x in most))
 
 
 def outputs_of(model: StructuredModel, u: Float, states: Float) -> Float:

@@ -64,6 +64,8 @@ def _sweep(sweep: SweepPrediction, recorded: Transient | None, name: str) -> dic
         "origin": sweep.origin,
         "peak_m": peak_m,
         "peak_frequency_hz": peak_hz,
+        "peak_band_m": None if sweep.peak_band_m is None else list(sweep.peak_band_m),
+        "peak_band_hz": None if sweep.peak_band_hz is None else list(sweep.peak_band_hz),
         "smallest_force_n": float(np.abs(sweep.force).min()),
         "range_use": sweep.range_use,
         "unbounded": sweep.unbounded_at_s is not None,
@@ -142,16 +144,25 @@ def _say_responses(responses: Sequence[dict[str, Any]]) -> None:
 def _say_sweeps(sweeps: Sequence[dict[str, Any]]) -> None:
     if not sweeps:
         return
-    print("sweeps")
+    has_bands = any(one["peak_band_m"] for one in sweeps)
+    print("sweeps; bands are 95 %" if has_bands else "sweeps")
     print_rows(
         [
-            {**one, "from": one["origin"] if one["origin"] != one["name"] else "the plan", "use": _range_use(one)}
+            {
+                **one,
+                "from": one["origin"] if one["origin"] != one["name"] else "the plan",
+                "use": _range_use(one),
+                "band_m": _ends(one["peak_band_m"], ".5f", 1e3),
+                "band_hz": _ends(one["peak_band_hz"], ".3f"),
+            }
             for one in sweeps
         ],
         Column("name", "sweep"),
         Column("from", "from"),
         Column("peak_m", "peak", "mm", ".5f", 1e3),
+        *([Column("band_m", "band")] if has_bands else []),
         Column("peak_frequency_hz", "at", "Hz", ".3f"),
+        *([Column("band_hz", "band")] if has_bands else []),
         Column("smallest_force_n", "least force", "N", ".4f"),
         Column("use", "range use"),
     )
@@ -160,14 +171,15 @@ def _say_sweeps(sweeps: Sequence[dict[str, Any]]) -> None:
 def _say_multisines(runs: Sequence[dict[str, Any]]) -> None:
     if not runs:
         return
-    print("multisines: relative errors, %")
+    has_bands = any("error_band" in run for run in runs)
+    print("multisines: relative errors, %" + ("; in brackets what 95 % do not exceed" if has_bands else ""))
     names = list(runs[0]["errors"])
     print_table(
         ("realisation", "use", *names, "range use"),
         [
             (
                 *(r["name"], r["use"]),
-                *("-" if r["unbounded"] else number(r["errors"].get(name), ".3f", 100.0) for name in names),
+                *("-" if r["unbounded"] else _with_band(r, name) for name in names),
                 _range_use(r),
             )
             for r in runs
@@ -180,15 +192,31 @@ def _say_multisines(runs: Sequence[dict[str, Any]]) -> None:
 def _say_planned(runs: Sequence[dict[str, Any]]) -> None:
     if not runs:
         return
-    print("planned multisines: RMS and largest value of the outputs, in their units")
+    has_bands = any("rms_band" in run for run in runs)
+    said = ", in brackets 95 % bands" if has_bands else ""
+    print(f"planned multisines: RMS and largest value of the outputs, in their units{said}")
     names = list(runs[0]["rms"])
     print_table(
         ("realisation", *(f"{name} {what}" for name in names for what in ("RMS", "largest")), "range use"),
         [
-            (r["name"], *(number(r[which][name], ".4g") for name in names for which in ("rms", "peak")), _range_use(r))
+            (r["name"], *(_in_band(r, which, name) for name in names for which in ("rms", "peak")), _range_use(r))
             for r in runs
         ],
     )
+
+
+def _with_band(run: dict[str, Any], name: str) -> str:
+    error = number(run["errors"].get(name), ".3f", 100.0)
+    return f"{error} ({number(run['error_band'][name], '.3g', 100.0)})" if "error_band" in run else error
+
+
+def _in_band(run: dict[str, Any], which: str, name: str) -> str:
+    value = number(run[which][name], ".4g")
+    return f"{value} ({_ends(run[f'{which}_band'][name], '.4g')})" if f"{which}_band" in run else value
+
+
+def _ends(ends: Sequence[float] | None, form: str, scale: float = 1.0) -> str:
+    return "-" if ends is None else " to ".join(number(end, form, scale) for end in ends)
 
 
 def _range_use(run: dict[str, Any]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
@@ -22,9 +22,12 @@ from identification import (
     simulated_run,
 )
 from identification.common import Arrays, Attributes, stored
-from identification.experiments import Simulator
+from identification.experiments import Simulator, unsettled
 from rig.errors import ConfigurationError
 from vibrolock.results import Result
+
+if TYPE_CHECKING:
+    from rig.results.simulated.open_bands import OpenBands
 
 
 def _check_parts(_: Arrays, attributes: Attributes) -> None:
@@ -74,6 +77,11 @@ class SimulatedModel(Result):
         """Share of the errors of the model's steps that its fit has not made up for; 1 if unknown."""
         return 1.0
 
+    @property
+    def fit_is_missing(self) -> bool:
+        """Whether bands need a covariance that is unknown."""
+        return self.scatter is None and self.allowed_by_fit(0) is None
+
     def allowed_by_fit(self, count: int) -> list[Simulator] | None:
         """Return models drawn by the covariance of the fit; None if it is unknown."""
         return None
@@ -83,6 +91,13 @@ class SimulatedModel(Result):
     ) -> ResponseBand:
         """Return the band of `allowed_by_fit` with what the data leave open; raise `IdentificationError` if it is too much."""
         return band
+
+    def open_bands(self, asked: bool, allowed: bool) -> "OpenBands | None":
+        """Return what is to be said of predictions beyond the training data; None for models that say nothing of them.
+
+        ``asked``: whether bands are asked for; ``allowed``: whether such predictions are allowed without a band.
+        """
+        return None
 
     def check_trusted(self, path: Path | None, trusted: bool) -> None:
         """Raise `ConfigurationError` if the model names code of a user that is not trusted."""
@@ -117,16 +132,19 @@ class SimulatedModel(Result):
             if not is_moved
         ]
         linear = self.linear
+        runs = tuple(
+            simulated_run(model, one, initial_state=begin, use=use, steps_left=self.steps_left)
+            for (one, use), begin, model in compress(zip(every, states, models, strict=True), moved)
+        )
+        if untold := unsettled(training):
+            runs = tuple(replace(run, over_noise=np.full(run.error.shape, np.nan)) for run in runs)
         found = replace(
             self,
-            runs=tuple(
-                simulated_run(model, one, initial_state=begin, use=use, steps_left=self.steps_left)
-                for (one, use), begin, model in compress(zip(every, states, models, strict=True), moved)
-            ),
+            runs=runs,
             linear_runs=()
             if linear is None
             else tuple(simulated_run(linear, one, use=use) for one, use in compress(every, moved)),
-            notes=(*self.notes, *still),
+            notes=(*self.notes, *still, *untold),
         )
         return found.on(training, validation, recordings)
 

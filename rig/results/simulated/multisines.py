@@ -1,11 +1,14 @@
 """Recorded and planned multisines as a model simulates them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from identification import Exciter, PeriodicSpectra, SimulatedRun, Simulation, simulated_run
+from identification import Exciter, Experiment, PeriodicSpectra, SimulatedRun, Simulation, simulated_run
+from identification.experiments import Simulator
+from identification.models import run_of
 from rig.bench import Bench
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.multisine.plan import MultisinePlan
@@ -19,15 +22,21 @@ from rig.results.predictions.sweeps import strangers
 from rig.results.simulated.data_files import fingerprint
 from rig.results.simulated.driven_models import DrivenModel, all_inputs, check_rate, coupled, driving, with_constants
 from rig.results.simulated.model import SimulatedModel
+from rig.results.simulated.open_bands import OpenBands
 from vibrolock.arrays import Float
 
 
 def simulated_multisines(
-    paths: Sequence[Path], identified: SimulatedModel, specimen: str, constants: Mapping[str, float]
+    paths: Sequence[Path],
+    identified: SimulatedModel,
+    specimen: str,
+    constants: Mapping[str, float],
+    bands: OpenBands | None = None,
 ) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
     """Simulate every realisation of recordings; return the runs with their use in the identification, and notes.
 
     ``specimen``: that of the model. ``constants``: inputs that are no channels of the recordings, with their values.
+    ``bands``: what is said beyond the training data.
     Raises `RecordingError` for recordings that are no multisines.
     """
     model, uses = identified.model, identified.uses
@@ -47,14 +56,19 @@ def simulated_multisines(
             notes += points_left_out(recording)
         for one in found:
             whole = with_constants(one, model, constants)
-            runs.append(simulated_run(model, whole, use=uses.get(fingerprint(whole), "test" if uses else "unknown")))
+            run = simulated_run(model, whole, use=uses.get(fingerprint(whole), "test" if uses else "unknown"))
+            runs.append(run if bands is None else _recorded_with_bands(bands, model, run, whole))
         if not uses:
             notes.append("the model does not say what it was identified with: these may be its training data")
     return tuple(runs), tuple(notes)
 
 
 def planned_multisines(
-    source: str, model: DrivenModel, exciter: Exciter | None, constants: Mapping[str, float]
+    source: str,
+    model: DrivenModel,
+    exciter: Exciter | None,
+    constants: Mapping[str, float],
+    bands: OpenBands | None = None,
 ) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
     """Simulate every level and realisation of a planned multisine from its voltage, the last period of it after the transient.
 
@@ -72,27 +86,44 @@ def planned_multisines(
         index = target.realisation or 0
         period = target.level * _period(plan, bench, index, samples)
         voltage_v = np.tile(period, ahead + 1)
-        run: Simulation
-        if exciter is None:
-            run = model.simulate(all_inputs(model, voltage_v[None], constants))
-        else:
-            run = coupled(model, exciter, voltage_v, plan.lowest_hz)
+        simulate = partial(_simulated, exciter, voltage_v, constants, plan.lowest_hz)
+        run = simulate(model)
         last = run.outputs[:, ahead * samples :]
         at = run.unbounded_at
-        runs.append(
-            SimulatedRun(
-                name=f"planned {target.level:.4g} V RMS, realisation {index + 1}",
-                level=target.level,
-                outputs=tuple(channel.name for channel in model.outputs),
-                error=np.full(len(model.outputs), np.nan),
-                range_use=run.range_use,
-                unbounded_at_s=None if at is None else at / model.sample_rate_hz,
-                use="planned",
-                rms=np.sqrt(np.mean(last**2, axis=1)),
-                peak=np.max(np.abs(last), axis=1),
-            )
+        predicted = SimulatedRun(
+            name=f"planned {target.level:.4g} V RMS, realisation {index + 1}",
+            level=target.level,
+            outputs=tuple(channel.name for channel in model.outputs),
+            error=np.full(len(model.outputs), np.nan),
+            range_use=run.range_use,
+            unbounded_at_s=None if at is None else at / model.sample_rate_hz,
+            use="planned",
+            rms=np.sqrt(np.mean(last**2, axis=1)),
+            peak=np.max(np.abs(last), axis=1),
         )
+        if bands is not None:
+            predicted = bands.of_run(predicted, last, partial(_last, simulate, ahead * samples), known=False)
+        runs.append(predicted)
     return tuple(runs), strangers(bench, model.specimen, exciter, source)
+
+
+def _recorded_with_bands(bands: OpenBands, model: Simulator, run: SimulatedRun, experiment: Experiment) -> SimulatedRun:
+    def counted(one: Simulator) -> Float:
+        return run_of(one, experiment).outputs[:, experiment.counted_from :]
+
+    return bands.of_run(run, counted(model), counted, known=True) if bands.wanted(run.range_use) else run
+
+
+def _simulated(
+    exciter: Exciter | None, voltage_v: Float, constants: Mapping[str, float], lowest_hz: float, model: DrivenModel
+) -> Simulation:
+    if exciter is None:
+        return model.simulate(all_inputs(model, voltage_v[None], constants))
+    return coupled(model, exciter, voltage_v, lowest_hz)
+
+
+def _last(simulate: Callable[[DrivenModel], Simulation], first: int, model: DrivenModel) -> Float:
+    return simulate(model).outputs[:, first:]
 
 
 def _period_samples(source: str, plan: MultisinePlan, rate_hz: float) -> int:

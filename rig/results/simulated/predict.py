@@ -6,6 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
+import numpy as np
+
 from identification import (
     Exciter,
     FrequencyResponse,
@@ -16,6 +18,7 @@ from identification import (
     frequency_response,
 )
 from identification.harmonic_balance import Held
+from identification.models import check_input
 from identification.prediction import band_of_responses
 from rig.errors import ConfigurationError
 from rig.results.files import load, load_as
@@ -23,6 +26,7 @@ from rig.results.predictions.references import Compared, other_specimens, predic
 from rig.results.simulated.driven_models import LARGEST_RANGE_USE, DrivenModel, Fixed, Level, constants_of, level_of
 from rig.results.simulated.model import SimulatedModel
 from rig.results.simulated.multisines import planned_multisines, simulated_multisines
+from rig.results.simulated.open_bands import OpenBands
 from rig.results.simulated.options import SimulatedPrediction
 from rig.results.simulated.steady import compared, default_held
 from rig.results.simulated.sweep_models import SimulatedSweepModels
@@ -30,6 +34,8 @@ from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simu
 
 _DRAWS = 40
 """Models of a band."""
+_FEW = 10
+"""Models of a band that is not asked for, beyond the training data: what these leave open is the larger part. Chosen."""
 _ANYWHERE = 1e3
 """Use of the trained range up to which responses of the ends of what the data leave open are followed."""
 
@@ -46,6 +52,7 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
     found.check_trusted(path, request.trust_code)
     _check(request, model, path)
     bands_asked = getattr(request, "bands", False)
+    open_ = found.open_bands(bands_asked, getattr(request, "allow_extrapolation", False))
     exciter = None if request.exciter is None else load_as(Exciter, request.exciter)
     constants = constants_of(model, request.constants, path)
     fixed: Fixed = {"exciter": exciter, "largest_range_use": LARGEST_RANGE_USE}
@@ -55,21 +62,29 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
     references_held = default_held(model, exciter)
     alone = request.forces_without_reference([one.measured for one in references], references_held)
     levels = [*(level_of(force, held) for force in alone), *(level_of(one, "voltage") for one in request.voltages_v)]
-    if bands_asked and not levels:
-        raise ConfigurationError("`bands`: are those of responses without a reference; add `forces_n` or `voltages_v`")
+    if bands_asked and found.fit_is_missing:
+        raise ConfigurationError(
+            f"`bands`: {path} has a model without its fit, whose covariance they need; leave it out"
+        )
     responses = [frequency_response(model, **level, **fixed) for level in levels]
-    others = _others(found, bands_asked, path) if levels else []
-    bands = [_band(found, others, level, fixed, response) for level, response in zip(levels, responses, strict=True)]
+    wanted = [_wanted(open_, one) for one in responses]
+    others = (
+        _others(found, _DRAWS if bands_asked else _FEW) if any(wanted) or (levels and found.scatter is not None) else []
+    )
+    bands = [
+        _band(found, others, level, fixed, response) if more or found.scatter is not None else None
+        for level, response, more in zip(levels, responses, wanted, strict=True)
+    ]
     steady = [Compared(one, band=band) for one, band in zip(responses, bands, strict=True)]
     steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
-    models = SimulatedSweepModels(model, exciter, constants)
+    models = SimulatedSweepModels(model, exciter, constants, open_)
     swept = [one for recording in request.sweeps for one in recorded_simulated_sweeps(recording, models)]
     swept += [one for plan in request.planned for one in planned_simulated_sweeps(plan, models)]
-    runs, said = simulated_multisines(request.multisines, found, model.specimen, constants)
+    runs, said = simulated_multisines(request.multisines, found, model.specimen, constants, open_)
     for plan in request.planned_multisines:
-        more, remarks = planned_multisines(plan, model, exciter, constants)
+        more, remarks = planned_multisines(plan, model, exciter, constants, open_)
         runs, said = (*runs, *more), (*said, *remarks)
-    if bands_asked and None in bands:
+    if any(one is None and more for one, more in zip(bands, wanted, strict=True)):
         said = (*said, "a response has no band where most of the models that the fit allows have no such response")
     if any(bands):
         of = (
@@ -88,16 +103,20 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
     return predictions_of(model.specimen, steady, swept, runs, notes)
 
 
-def _others(found: SimulatedModel, asked: bool, path: Path) -> Sequence[DrivenModel]:
+def _wanted(open_: OpenBands | None, response: SteadyPrediction) -> bool:
+    """Return whether a response gets a band; raise `ExtrapolationError` if it is beyond what a model without its fit says."""
+    use = float(np.nanmax(response.range_use, initial=0.0))
+    if open_ is None or not open_.wanted(use):
+        return False
+    if response.peak_reached() or open_.fit is None:
+        check_input(response.name, use)
+    return open_.fit is not None
+
+
+def _others(found: SimulatedModel, count: int) -> Sequence[DrivenModel]:
     if found.scatter is not None:
         return list(found.scatter.fresh(cast(DrivenModel, found.model), _DRAWS))
-    if not asked:
-        return []
-    if (models := found.allowed_by_fit(_DRAWS)) is None:
-        raise ConfigurationError(
-            f"`bands`: {path} has a model without its fit, whose covariance they need; leave it out"
-        )
-    return cast(Sequence[DrivenModel], models)
+    return cast(Sequence[DrivenModel], found.allowed_by_fit(count) or [])
 
 
 def _band(
@@ -108,7 +127,7 @@ def _band(
     for model in others:
         with suppress(IdentificationError):
             responses.append(frequency_response(model, **level, **fixed))
-    if len(responses) <= _DRAWS // 2:
+    if len(responses) <= len(others) // 2:
         return None
     band = band_of_responses(responses)
     if found.scatter is not None:

@@ -1,7 +1,7 @@
 """Sweeps of a PNLSS or structured model, alone or with its exciter: simulated, then demodulated."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from identification import (
     IdentificationError,
     PnlssModel,
     Simulation,
+    StructuredModel,
     SweepPrediction,
     Transient,
     demodulate,
@@ -18,6 +19,7 @@ from identification import (
 from identification.common import MOTION_ORDER, find_role
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.results.simulated.driven_models import DrivenModel, all_inputs, coupled, driving
+from rig.results.simulated.open_bands import OpenBands
 from vibrolock.arrays import Float
 
 _SHOWN = 10.0
@@ -39,6 +41,8 @@ class SweepGiven:
     """Largest output at the drive point that is worth showing."""
     initial_state: Float | None
     origin: str
+    is_recorded: bool
+    """Whether the sweep was made, so that its errors are known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,8 @@ class SimulatedSweepModels:
     """Exciter that drives a force-driven model from the voltage; without it, the recorded force drives the model."""
     constants: Mapping[str, float] = field(default_factory=dict)
     """Values of the inputs that are constant, by name."""
+    bands: OpenBands | None = None
+    """What is said beyond the training data; None for nothing."""
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
@@ -77,7 +83,7 @@ class SimulatedSweepModels:
         )
         s = 2j * np.pi * found.frequency_hz
         drive_m = found.fundamentals[1] / s ** MOTION_ORDER[model.outputs[row].motion]
-        return SweepPrediction(
+        predicted = SweepPrediction(
             time_s=found.time_s,
             frequency_hz=found.frequency_hz,
             modal_amplitude=np.full(found.time_s.size, complex(np.nan)),
@@ -91,6 +97,17 @@ class SimulatedSweepModels:
             notes=tuple(notes),
             simulated_range_use=run.range_use,
             unbounded_at_s=unbounded_at_s,
+        )
+        if self.bands is None:
+            return predicted
+        shape = (
+            float(np.max(np.abs(model.linearised().output_shapes[row]))) if isinstance(model, StructuredModel) else 0.0
+        )
+        return self.bands.of_sweep(
+            predicted,
+            shape,
+            lambda other: replace(self, model=other, bands=None).predict(given).peak(),
+            given.is_recorded,
         )
 
     def _simulated(self, given: SweepGiven) -> tuple[Float, Channel, Simulation, list[str]]:

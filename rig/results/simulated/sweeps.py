@@ -68,6 +68,7 @@ def planned_simulated_sweeps(plan_source: str, models: SimulatedSweepModels) -> 
             frequencies_hz=(plan.start_hz, plan.stop_hz),
             largest=_largest_in_training(models.model, row),
             initial_state=None,
+            is_recorded=False,
             origin=f"planned {level_v:g} V, {plan.start_hz:g} to {plan.stop_hz:g} Hz, {rate}",
         )
         yield Swept(models.predict(given), notes=notes)
@@ -143,6 +144,7 @@ def _recorded(recording: Recording, number: int, models: SimulatedSweepModels) -
         frequencies_hz=ends,
         largest=float(np.abs(found.outputs[row]).max()),
         initial_state=begin,
+        is_recorded=True,
         origin=f"the recorded {', '.join(channel.name for channel in models.inputs)}",
     )
     return given, tuple(said)

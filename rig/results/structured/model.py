@@ -8,6 +8,7 @@ from identification import ResponseBand, SteadyPrediction, StructuredFit, Struct
 from identification.experiments import Simulator
 from identification.models import UserSpring, drawn
 from rig.results.simulated.model import SimulatedModel
+from rig.results.simulated.open_bands import OpenBands
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -34,6 +35,10 @@ class IdentifiedStructured(SimulatedModel):
     def allowed_by_fit(self, count: int) -> list[Simulator] | None:
         """Return models drawn by the covariance of the fit; None if it is unknown."""
         return None if self.fit is None else list(drawn(self.fit, count))
+
+    def open_bands(self, asked: bool, allowed: bool) -> OpenBands | None:
+        """Return what is to be said of predictions beyond the training data; None for a model without elements."""
+        return OpenBands(None if self.scatter else self.fit, asked, allowed) if self.model.elements else None
 
     def with_what_is_open(
         self, band: ResponseBand, response: SteadyPrediction, respond: Callable[[Any], SteadyPrediction]

@@ -96,4 +96,6 @@ class StructuredPrediction(SimulatedPrediction):
     takes: ClassVar[str] = "a structured model, which answers"
 
     bands: bool = False
-    """Give the responses 95 % bands, from 40 models that the fit allows and laws that fit as well; in the time of 46."""
+    """Give predictions 95 % bands, from models that the fit allows and laws that fit as well; in the time of 26 to 46."""
+    allow_extrapolation: bool = False
+    """Permit predictions beyond the training data without a band, which otherwise have one or are refused."""

@@ -509,14 +509,6 @@ def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
             "predict S.h5 --frequency-response 1 --modes modes.h5",
             "--modes: does not apply to a structured model, which answers",
         ),
-        (
-            "predict S.h5 --frequency-response 1 --allow-extrapolation",
-            "--allow-extrapolation: does not apply to a structu",
-        ),
-        (
-            "predict S.h5 --multisine lines.h5 --bands",
-            "--bands: are those of responses without a reference; add --freq",
-        ),
         ("predict modes.h5 --frequency-response 1 --bands", "predictions are made with a nonlinear-mode, pnlss"),
         ("predict S.h5 --frequency-response 1 --force rms", "'rms' of a model driven by a force needs an exciter"),
         (

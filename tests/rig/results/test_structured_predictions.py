@@ -122,7 +122,27 @@ def test_figures_are_drawn_and_other_responses_refused(told, command, model, mon
     told("--frequency-response 0.15 --sweep ahead.h5 --multisine lines.h5")
     monkeypatch.chdir(model.parent)
     assert command("plot OUT.h5 -o OUT.png").status == 0
-    assert "elements reach" in command("predict ST.h5 --frequency-response 0.9 -o BIG.h5 --overwrite").out
+    said = command("predict ST.h5 --frequency-response 0.9 --allow-extrapolation -o BIG.h5 --overwrite").out
+    assert "elements reach" in said
+
+
+def test_beyond_twice_the_training_a_response_and_a_planned_sweep_are_refused(command, model, monkeypatch):
+    monkeypatch.chdir(model.parent)
+    loud = (model.parent / "ahead.toml").read_text().replace("[0.3]", "[6.0]")
+    (model.parent / "loud.toml").write_text(loud)
+    for line in ("--frequency-response 5", "--planned-sweep loud.toml --exciter EX.h5"):
+        done = command(f"predict ST.h5 {line} -o BIG.h5 --overwrite")
+        assert done.status == 1
+        assert "above 2 nothing is known of the error" in done.err or "leaves the range" in done.err
+
+
+@pytest.mark.slow
+def test_the_band_of_a_planned_sweep_holds_that_which_is_recorded_later(told):
+    found = told("--planned-sweep ahead.toml --sweep ahead.h5 --exciter EX.h5 --bands")["sweeps"]
+    (low_m, high_m), (low_hz, high_hz) = found[0]["peak_band_m"], found[0]["peak_band_hz"]
+    assert low_m < found[1]["peak_m"] < high_m
+    assert low_hz < found[1]["peak_frequency_hz"] < high_hz
+    assert high_m < 1.2 * low_m
 
 
 def test_its_backbone_lies_on_that_which_is_measured(model, command, monkeypatch):
