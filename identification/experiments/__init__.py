@@ -6,7 +6,11 @@ from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
     from identification.experiments.experiment import InitialState as InitialState
-    from identification.experiments.noise import mean_covariance as mean_covariance
+    from identification.experiments.noise import (
+        PeriodChange as PeriodChange,
+        mean_covariance as mean_covariance,
+        period_change as period_change,
+    )
     from identification.experiments.periodicity import period_remark as period_remark
     from identification.experiments.residuals import (
         EXPLAINED as EXPLAINED,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
-from identification.experiments.noise import mean_covariance
+from identification.experiments.noise import PeriodChange, mean_covariance, period_change
 from identification.validation import convert_fields, finite_array, positive
 from vibrolock.arrays import Complex, Float
 
@@ -52,6 +52,8 @@ class Experiment:
     noise_covariance
         complex[n_lines, n, n], covariance of the amplitudes (peak) of the lines 1, 2, ... below half the sample rate, of all
         inputs and then all outputs, from the scatter of periods that were averaged; None if unknown.
+    period_change
+        Mean over the periods less the last of them, which tells a transient that was left; None if unknown.
     """
 
     inputs: Float
@@ -68,6 +70,7 @@ class Experiment:
     specimen: str = ""
     excited_hz: tuple[float, float] | None = None
     noise_covariance: Complex | None = None
+    period_change: PeriodChange | None = None
 
     def __post_init__(self) -> None:
         convert_fields(self, tuple, "input_channels", "output_channels")
@@ -101,6 +104,10 @@ class Experiment:
         noise = self.noise_covariance
         if noise is not None and self.period_samples and np.shape(noise) != allowed_shape:
             raise refused(f"shape {np.shape(noise)}", field="noise_covariance", allowed=allowed_shape)
+        change = self.period_change
+        if change is not None and self.period_samples and np.shape(change.values)[-1:] != (self.period_samples,):
+            needed = f"a row for each channel, {self.period_samples} samples"
+            raise refused(f"shape {np.shape(change.values)}", field="period_change", allowed=needed)
         if self.excited_hz is not None and not 0.0 <= self.excited_hz[0] < self.excited_hz[1]:
             allowed = "two rising frequencies, none below zero"
             raise refused(field="excited_hz", value=self.excited_hz, allowed=allowed)
@@ -177,17 +184,24 @@ class Experiment:
             reason = f"experiment '{self.name}': is not periodic, so that there are no periods to average"
             raise IdentificationError(reason)
         ahead = self.counted_from if transient_samples is None else transient_samples
-        size, noise = self.period_samples, self.noise_covariance
-        if noise is None:
-            both = np.vstack([self.counted_inputs, self.counted_outputs])
-            noise = mean_covariance(both.reshape(len(both), -1, size), size)
+        size, noise, change = self.period_samples, self.noise_covariance, self.period_change
+        both = np.vstack([self.counted_inputs, self.counted_outputs]).reshape(-1, self.counted // size, size)
+        noise = mean_covariance(both, size) if noise is None else noise
+        change = period_change(both) if change is None else change
         means = [
             values.reshape(len(values), -1, self.period_samples).mean(axis=1)[
                 :, np.arange(-ahead, self.period_samples) % self.period_samples
             ]
             for values in (self.counted_inputs, self.counted_outputs)
         ]
-        return replace(self, inputs=means[0], outputs=means[1], counted_from=ahead, noise_covariance=noise)
+        return replace(
+            self,
+            inputs=means[0],
+            outputs=means[1],
+            counted_from=ahead,
+            noise_covariance=noise,
+            period_change=change,
+        )
 
     def with_constant_input(self, value: float = 1.0) -> "Experiment":
         """Return the experiment with an additional input ``constant`` of one value, whose effect compensates offsets.
@@ -195,11 +209,12 @@ class Experiment:
         Offsets of sensors and amplifiers strongly disturb polynomials and are rarely known well enough to be subtracted. Give
         the input the same value in all experiments, including predicted ones.
         """
-        at, noise = len(self.inputs), self.noise_covariance
+        at, noise, change = len(self.inputs), self.noise_covariance, self.period_change
         return replace(
             self,
             inputs=np.vstack([self.inputs, np.full((1, self.inputs.shape[1]), positive("value", value))]),
             noise_covariance=None if noise is None else np.insert(np.insert(noise, at, 0.0, axis=1), at, 0.0, axis=2),
+            period_change=None if change is None else change._replace(values=np.insert(change.values, at, 0.0, axis=0)),
             input_channels=(*self.input_channels, Channel("constant", "monitor", "1")),
         )
 

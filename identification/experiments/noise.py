@@ -1,4 +1,6 @@
-"""Noise of the mean over periods."""
+"""Noise of the mean over periods, and by how much the last of them differs from it."""
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,3 +20,18 @@ def mean_covariance(periods: Float, size: int) -> Complex | None:
     lines = np.fft.rfft(periods, axis=-1)[..., 1 : (size + 1) // 2] * (2.0 / periods.shape[-1])
     left = np.moveaxis(lines - lines.mean(axis=1, keepdims=True), -1, 0)
     return np.asarray(left @ left.conj().swapaxes(1, 2) / ((count - 1) * count))
+
+
+class PeriodChange(NamedTuple):
+    """Mean over the periods of a record less the last of them: noise, and what is left of a transient."""
+
+    values: Float
+    """float[n_channels, n], of all inputs and then all outputs."""
+    periods: int
+    """Number of periods, two at least."""
+
+
+def period_change(periods: Float) -> PeriodChange | None:
+    """Return the change of ``periods``, float[n_channels, n_periods, n]; None for a single period."""
+    count = periods.shape[1]
+    return PeriodChange(periods.mean(axis=1) - periods[:, -1], count) if count > 1 else None

@@ -13,7 +13,7 @@ import numpy as np
 from identification.channels import chosen_rows
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
-from identification.experiments.noise import mean_covariance
+from identification.experiments.noise import mean_covariance, period_change
 from identification.experiments.periodicity import check_periods
 from identification.experiments.time_records import TimeRecord, TimeRecords
 from identification.signals.decimation import EDGE_SAMPLES, decimated
@@ -84,11 +84,11 @@ def time_experiments(
 def _experiment(
     records: TimeRecords, record: TimeRecord, into: Sequence[int], out: Sequence[int], rate_hz: float
 ) -> Experiment:
-    size, ahead, noise, band = 0, 0, None, records.excited_hz
+    size, ahead, noise, change, band = 0, 0, None, None, records.excited_hz
     if records.period_samples:
         periods = resampled_periods(record.samples, records.period_samples, records.sample_rate_hz, rate_hz)
         size = periods.shape[-1]
-        noise = mean_covariance(periods[[*into, *out]], size)
+        noise, change = mean_covariance(periods[[*into, *out]], size), period_change(periods[[*into, *out]])
         ahead = round(records.ahead_periods * size)
         band = band or _band(periods[list(into)].mean(axis=1), rate_hz)
         values = periods.mean(axis=1)[:, np.arange(-ahead, size) % size]
@@ -108,6 +108,7 @@ def _experiment(
         specimen=records.specimen,
         excited_hz=band,
         noise_covariance=noise,
+        period_change=change,
     )
 
 

@@ -60,6 +60,9 @@ class StructuredFit(FitResult):
         All models that were fitted, in the order in which they were, with what their elements brought.
     steps_left
         Share of the errors of the simulation's steps that no change of the numbers makes up for; 1 if unknown.
+    transient
+        Largest change of the periods of an experiment, over the RMS of its outputs, where it is more than noise; 0 if none is.
+        What it does to the numbers is in the covariance.
     missing
         What would explain the residual where noise does not, from the largest share; empty where noise does or is unknown.
     unseen
@@ -75,6 +78,7 @@ class StructuredFit(FitResult):
     training_error: float
     trials: tuple[ElementTrial, ...] = ()
     steps_left: float = 1.0
+    transient: float = 0.0
     unseen: tuple[str, ...] = ()
     missing: tuple[MissingForce, ...] = ()
 
@@ -190,7 +194,7 @@ def fit_structured(
         kept, trials = select_elements(wanted, fits, selective=bool(validation))
     else:
         kept, trials = choose_law(ModelFits(fits, tuple(between), watch), tuple(between))
-    covariance, steps_left, unseen = kept.problem.uncertainty(kept.last.vector)
+    covariance, steps_left, unseen, transient = kept.problem.uncertainty(kept.last.vector)
     return StructuredFit(
         model=kept.model.trained_with(experiments),
         start=kept.start,
@@ -205,6 +209,7 @@ def fit_structured(
         message=kept.last.ending.message,
         trials=trials,
         steps_left=steps_left,
+        transient=transient,
         missing=fits.missing(kept),
         unseen=tuple(name for name, one in zip(kept.problem.parameters.names, unseen, strict=True) if one),
     )

@@ -22,6 +22,7 @@ from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging
 from identification.models.structured.parameters import Parameters
 from identification.models.structured.progress import FitWatch
+from identification.models.structured.transients import own_change, transient_factor
 from vibrolock.arrays import Float
 
 EVALUATIONS = 100
@@ -126,16 +127,20 @@ class Problem:
         self._watch.linearised(error, time.perf_counter() - began_s)
         return found
 
-    def uncertainty(self, vector: Float) -> tuple[Float, float, NDArray[np.bool_]]:
-        """Return the covariance, the share of the steps' errors that no change of the numbers makes up for, and what is unseen.
+    def uncertainty(self, vector: Float) -> tuple[Float, float, NDArray[np.bool_], float]:
+        """Return the covariance, the share of the steps' errors that no change makes up for, what is unseen, and a transient.
 
         Unseen, bool[P], are numbers on which the data do not depend, or only together with others.
         The covariance is float[P, P], as if the residual of each experiment were white, with a size of its own.
         The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment; and what the steps of the
         simulation move, to first order, as one error that all numbers share. Errors of outputs fall with the square of the
-        step, so that a run with half of it tells them (Richardson).
+        step, so that a run with half of it tells them (Richardson). Likewise what is left of a transient in each experiment,
+        where the change of its periods exceeds their noise (`transient_factor`), and that noise. The transient is the largest
+        change over the RMS of the outputs of its experiment, 0 if none stands out.
         """
-        parts, tested = self._rows(self._with_finer, vector)
+        whole_parts, tested = self._rows(self._with_finer, vector)
+        changes = [part[: part.shape[1], -3] for part in whole_parts]
+        parts = [np.delete(part, -3, axis=1) for part in whole_parts]
         tested = self._misfit * np.insert(tested, -1, 0.0, axis=1)
         rows = np.concatenate([*parts, tested])
         inverse, unseen = _inverse(rows[:, :-2])
@@ -147,10 +152,29 @@ class Problem:
             middle = middle + variance * part[:, :-2].T @ part[:, :-2]
         of_steps = inverse @ (rows[:, :-2].T @ rows[:, -2])
         covariance = np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
+        transient, slowest = 0.0, self._slowest_1_s(vector)
+        for part, change, one in zip(parts, changes, self.experiments, strict=True):
+            factor = transient_factor(part, change, one, slowest)
+            if factor > 0.0:
+                shift = factor * (inverse @ (part[:, :-2].T @ change))
+                assert one.period_change is not None
+                variance = (one.period_change.periods - 1) * float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
+                by_noise = factor**2 * variance * inverse @ (part[:, :-2].T @ part[:, :-2]) @ inverse
+                covariance = covariance + np.outer(shift, shift) + by_noise
+                transient = max(transient, self._share(change, one))
         column = qr_r(rows[:, :-1])[:, -1]
         whole = float(np.linalg.norm(column))
         left = float(abs(column[vector.size]) / whole) if whole > 0.0 and column.size > vector.size else 1.0
-        return covariance, left, unseen
+        return covariance, left, unseen, transient
+
+    def _slowest_1_s(self, vector: Float) -> float:
+        """Rate of the slowest decay of the model's modes in small vibrations."""
+        model = self.parameters.model(vector)
+        return float(np.min(model.omega * model.damping_ratio))
+
+    def _share(self, change: Float, one: Experiment) -> float:
+        scaled = one.counted_outputs / self._scale[:, None]
+        return float(np.linalg.norm(change) / np.linalg.norm(np.sqrt(one.weight) * scaled))
 
     def _rows(self, of_one: Callable[..., Float], vector: Float) -> tuple[list[Float], Float]:
         """Return what ``of_one`` gives for each experiment, and the rows of the modal test."""
@@ -161,7 +185,7 @@ class Problem:
             return list(parts), tested
 
     def _with_finer(self, model: StructuredModel, experiment: Experiment, nudging: Nudging | None) -> Float:
-        """float[P + 2, P + 2]: as `_of_one`, with the errors that the steps make of the outputs before the residuals."""
+        """float[P + 3, P + 3]: as `_of_one`, with the change of the periods and the errors by the steps as well."""
         finer = None if nudging is None else replace(nudging, steps=2 * nudging.steps)
         fine = self.parameters.outputs(
             replace(model, steps=2 * model.steps), experiment.inputs, experiment.counted_from, finer
@@ -173,7 +197,9 @@ class Problem:
     ) -> Float:
         weight = np.sqrt(experiment.weight) / self._scale
         found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, nudging)
-        of_steps = [] if fine is None else [4.0 / 3.0 * (found - fine)[..., None]]
+        of_steps = (
+            [] if fine is None else [own_change(experiment, found)[..., None], 4.0 / 3.0 * (found - fine)[..., None]]
+        )
         residual = (found - experiment.counted_outputs.T)[..., None]
         both = np.concatenate([derivatives, *of_steps, residual], axis=2) * weight[:, None]
         return qr_r(both.reshape(-1, both.shape[2]))

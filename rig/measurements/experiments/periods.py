@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from identification import Experiment, IdentificationError
-from identification.experiments import mean_covariance
+from identification.experiments import mean_covariance, period_change
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, result_of
 from rig.campaigns.evaluation.vibrations import channel_factors
@@ -36,9 +36,9 @@ def realisation(
     played = plan.model_copy(update={"periods": result_of(point).periods})
     recorded = turned_periods(bench, played, point.realisation or 0, rows)
     size = samples_of_a_period(plan, bench, rate_hz)
-    noise = None
+    noise, change, chosen = None, None, [*signals.inputs, *signals.outputs]
     if periods == "mean":
-        chosen = [*signals.inputs, *signals.outputs]
+        change = period_change(_resampled(recorded, bench, size, signals.offset)[chosen])
         noise = mean_covariance(recorded[chosen], size)
         if noise is not None:
             hz = np.arange(1, len(noise) + 1) * bench.sample_rate_hz / recorded.shape[-1]
@@ -58,6 +58,7 @@ def realisation(
         level=point.level,
         excited_hz=(plan.lowest_hz, plan.highest_hz),
         noise_covariance=noise,
+        period_change=change,
     )
 
 

@@ -9,7 +9,7 @@ import scipy
 
 from identification import Channel, Experiment
 from identification.common import chosen_rows
-from identification.experiments import InitialState
+from identification.experiments import InitialState, PeriodChange
 from rig.bench import Bench
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 
@@ -31,6 +31,7 @@ class _Facts(TypedDict, total=False):
     period_samples: int
     excited_hz: tuple[float, float]
     noise_covariance: np.ndarray | None
+    period_change: PeriodChange | None
 
 
 @dataclass(frozen=True)

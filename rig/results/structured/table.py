@@ -111,6 +111,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
             "stopped": fit.message,
             "seconds": fit.seconds,
             "trials": [asdict(trial) for trial in fit.trials],
+            "transient": fit.transient,
             "missing": [asdict(force) for force in fit.missing],
         },
         "notes": [*found.notes, *(f"names a function, {one}: simulations import it" for one in found.functions)],
@@ -126,6 +127,11 @@ def _say(summary: dict[str, Any]) -> None:
             f"{fit['numbers']} numbers fitted, error {number(fit['training_error'], '.3f', 100.0)} % in training, "
             f"{fit['evaluations']} simulations; {number(summary['seconds'], '.1f')} s in all; {fit['stopped']}"
         )
+        if fit["transient"] > 0.0:
+            print(
+                f"the training data have not quite settled: their mean differs from the last period by up to "
+                f"{100.0 * fit['transient']:.2g} % beyond noise, which the intervals include"
+            )
     if summary["modes"] is not None:
         print("small vibrations, all joints stuck" if summary["joints"] else "small vibrations")
         _say_modes(summary["modes"])

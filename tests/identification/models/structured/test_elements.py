@@ -43,14 +43,19 @@ def accelerations(u, h, every, omega, zeta, b, spring, cubic, joint, stiffness, 
     return out
 
 
-def experiment(rms_n: float, seed: int) -> Experiment:
-    """The last two periods under a multisine from 10 to 75 Hz, without noise."""
+def force_of(rms_n: float, seed: int) -> np.ndarray:
+    """A period of a multisine from 10 to 75 Hz, at the steps of the integration."""
     spectrum = np.zeros(PERIOD * FINE // 2 + 1, complex)
     frequency_hz = np.arange(spectrum.size) * RATE_HZ / PERIOD
     lines = (frequency_hz >= 10.0) & (frequency_hz <= 75.0)
     spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(seed).random(int(lines.sum())))
     fine = np.fft.irfft(spectrum)
-    fine *= rms_n / np.std(fine)
+    return fine * rms_n / np.std(fine)
+
+
+def periods(rms_n: float, seed: int) -> np.ndarray:
+    """float[n_outputs, PERIODS, PERIOD]: outputs from rest, without noise."""
+    fine = force_of(rms_n, seed)
     found = accelerations(
         np.tile(fine, PERIODS),
         1.0 / RATE_HZ / FINE,
@@ -64,9 +69,14 @@ def experiment(rms_n: float, seed: int) -> Experiment:
         STIFFNESS_N_M,
         SLIP_M,
     )
+    return (OUTPUTS @ found.T).reshape(len(OUTPUTS), PERIODS, PERIOD)
+
+
+def experiment(rms_n: float, seed: int) -> Experiment:
+    """The last two periods, without noise."""
     return Experiment(
-        inputs=np.tile(fine[::FINE], 2)[None],
-        outputs=OUTPUTS @ found[-2 * PERIOD :].T,
+        inputs=np.tile(force_of(rms_n, seed)[::FINE], 2)[None],
+        outputs=periods(rms_n, seed)[:, -2:].reshape(len(OUTPUTS), -1),
         sample_rate_hz=RATE_HZ,
         input_channels=(FORCE,),
         output_channels=CHANNELS,
