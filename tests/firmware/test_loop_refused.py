@@ -140,6 +140,8 @@ RANGES = [
     ("settling", "count", -1),
     *(("progress", name, 1) for name in ("segment", "entered", "finished", "sample", "n_refused")),
     ("progress", "held_back", 2),
+    ("progress", "retries", 101),
+    ("progress", "tries_left", 101),
     ("outcomes", "outcome", 14),
 ]
 
