@@ -207,7 +207,7 @@ def told(seed: int, systems: str) -> Iterator[str]:
     yield "|---|---|---|---|---|---|"
     cases = [(name, "the same", how) for name, how in RIGHT.items()] + WRONG
     for name, law, how in cases:
-        if systems and name not in systems.split(","):
+        if systems and name not in systems.split("; "):
             continue
         fit, runs = fitted(name, how, seed)
         ratio, wrong = judged(fit, runs)
@@ -226,7 +226,7 @@ def told(seed: int, systems: str) -> Iterator[str]:
 def right(seed: int, systems: str) -> Iterator[str]:
     """One line for each fit of a right structure."""
     for name, how in RIGHT.items():
-        if systems and name not in systems.split(","):
+        if systems and name not in systems.split("; "):
             continue
         try:
             fit, runs = fitted(name, how, seed)
@@ -243,7 +243,7 @@ def auto(seed: int, systems: str) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|"
     for name, structure in STRUCTURES.items():
         how = RIGHT[name]
-        if "elements" in how or (systems and name not in systems.split(",")):
+        if "elements" in how or (systems and name not in systems.split("; ")):
             continue
         runs = [experiment(structure, level, 10 * seed + k) for k, level in enumerate(SEVERAL_LEVELS)]
         held_out = [experiment(structure, level, 500 + 10 * seed + k) for k, level in enumerate(SEVERAL_LEVELS)]
@@ -263,7 +263,7 @@ def auto(seed: int, systems: str) -> Iterator[str]:
 
 
 def main(part: str = "told", first: int = 1, seeds: int = 1, systems: str = "") -> None:
-    """Print a part for some seeds of noise and phases; ``systems``: some structures, with commas."""
+    """Print a part for some seeds of noise and phases; ``systems``: some structures, with ``; `` between them."""
     for seed in range(first, first + seeds):
         for line in {"told": told, "right": right, "auto": auto}[part](seed, systems):
             print(line, flush=True)
