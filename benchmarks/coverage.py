@@ -9,7 +9,11 @@ and at this amplitude; with ``--at force`` at the measured force instead, and of
 
 The random part of an interval is compared with the scatter of the errors about their mean over the seeds: it shall cover 95 %.
 The whole interval shall cover the truth. ``--noise 10`` is ten times the noise of all sensors and ten times the steps of
-their converter. ``own`` is the rig of docs/tutorials/a-rig-of-your-own.md.
+their converter. ``own`` is the rig of docs/tutorials/a-rig-of-your-own.md; further plans on it and on a drawn one are those of
+`benchmarks.coverage_rigs`.
+
+Held displacements are judged by their points at phase resonance. Points that are not settled (short ones, those of a continuous
+backbone) have no force and amplitude of their own: truth is that of phase resonance at the amplitude that they are given.
 """
 
 import json
