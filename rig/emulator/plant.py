@@ -12,7 +12,7 @@ from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.virtual.driver import COUNTED, HOLD_SAMPLES
 from rig.drivers.virtual.faults import OUTPUT_HELD
-from rig.drivers.virtual.kernels import exchange_block, loopback_of
+from rig.drivers.virtual.kernels import Exchange, loopback_of
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.kernels import Flag
@@ -107,7 +107,7 @@ class VirtualPlant:
         self._arrays, self._state = self._realised.build(self._seed)
         loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
         counts = np.zeros(len(COUNTED), np.int64)
-        self._converters = self._daq.converters(counts, loopback)
+        self._swap = Exchange(self._arrays, self._state, self._daq.converters(counts, loopback))
         self._first = 0
         self._buffers_for(0)
         if self.log is not None:
@@ -129,10 +129,8 @@ class VirtualPlant:
             self._buffers_for(n)
         for arrays, part in self._realised.pieces(self._arrays, self._first, n):
             self._arrays = arrays
-            exchange_block(
-                self._arrays,
-                self._state,
-                self._converters,
+            self._swap.change(arrays)
+            self._swap(
                 self._first + part.start,
                 voltages[part],
                 self._readings_v[part],

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
+    from simulators.addressed import addressed as addressed, rig_at as rig_at, state_at as state_at
     from simulators.layout import Flag as Flag, RigArrays as RigArrays, RigState as RigState
     from simulators.plant.compilation import aligned as aligned, pad as pad
     from simulators.plant.kernels import advance as advance, joint_forces as joint_forces, local_forces as local_forces

@@ -1,7 +1,7 @@
 """`VirtualDAQ`: a virtual rig behind the DAQ contract, with any block size and any latency."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -14,13 +14,12 @@ from rig.bench.configuration import Configured, invalid, validated
 from rig.daq import DAQ, Capabilities, Image
 from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, Outputs, PassingFaults, held_outputs
 from rig.drivers.virtual.images import image_biases, image_remarks
-from rig.drivers.virtual.kernels import Converters, Loopback, exchange_block, fused, loopback_of
+from rig.drivers.virtual.kernels import Converters, Exchange, Loopback, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from rig.tick.safety.kernels import is_over
 from simulators import VirtualRig
-from simulators.kernels import Flag, RigArrays
-from vibrolock.compiled import bound
+from simulators.kernels import Flag, RigArrays, addressed
 from vibrolock.one_thread import one_thread
 
 if TYPE_CHECKING:
@@ -94,7 +93,7 @@ class VirtualDAQ(DAQ):
         """Arrays of the rig while the output is 0 V; those of the rig itself if its exciter stays attached."""
         self._exchanged = self._converters(0, loopback_of(self.channels, 0.0), self._faults(bench.block))
         self._first = 0
-        self._exchange_bound: Callable[..., None] | None = None
+        self._swap: Exchange
 
     def _faults(self, ahead: int) -> FaultArrays:
         outputs = Outputs(self.block or self._bench_block, ahead, self.continuation)
@@ -110,11 +109,11 @@ class VirtualDAQ(DAQ):
                 allowed="0 for an emulated device, whose outputs come as late as its host sends them",
             )
         faults = held_outputs(self._seed, self.sample_rate_hz, self._bench_block, self._queue_options.faults)
-        return Converters(np.zeros(0), counts, loopback, faults, self._how != "attached", self._released)
+        return Converters(np.zeros(0), counts, loopback, faults, self._how != "attached", addressed(self._released))
 
     def _converters(self, queue_samples: int, loopback: Loopback, faults: FaultArrays) -> Converters:
         releases = self._how != "attached"
-        return Converters(np.zeros(queue_samples), self._counts, loopback, faults, releases, self._released)
+        return Converters(np.zeros(queue_samples), self._counts, loopback, faults, releases, addressed(self._released))
 
     def _checked_arrays(self, seed: int) -> RigArrays:
         """Arrays of the rig; refuses, before a run begins, parts whose arrays cannot be computed or are not finite."""
@@ -239,26 +238,20 @@ class VirtualDAQ(DAQ):
         faults = self._faults(self.block + self.queue_samples)
         self._exchanged = self._converters(self.queue_samples, loopback, faults)
         self._fused = self._converters(self.block + self.queue_samples, loopback, faults)
+        self._swap = Exchange(self._arrays, self._state, self._exchanged)
         self._counts[:] = 0
         self._first = 0
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        if self._wears:
-            for arrays, part in self._pieces(voltages.size):
-                self._arrays = arrays
-                self._swap(exchange_block, voltages[part], inputs[part], self.flags[part], self.put_out[part])
+        if not self._wears:
+            self._swap(self._first, voltages, inputs, self.flags, self.put_out)
+            self._first += voltages.size
             return
-        if self._exchange_bound is None:
-            fixed = self._arrays, self._state, self._exchanged
-            self._exchange_bound = bound(
-                exchange_block, *fixed, self._first, voltages, inputs, self.flags, self.put_out
-            )
-        self._swap(self._exchange_bound, voltages, inputs, self.flags, self.put_out)
-
-    def _swap(self, kernel: Callable[..., None], voltages: np.ndarray, *filled: np.ndarray) -> None:
-        """Exchange samples during which the plant does not change; fills inputs, flags and ``put_out``."""
-        kernel(self._arrays, self._state, self._exchanged, self._first, voltages, *filled)
-        self._first += voltages.size
+        for arrays, part in self._pieces(voltages.size):
+            self._arrays = arrays
+            self._swap.change(arrays)
+            self._swap(self._first, voltages[part], inputs[part], self.flags[part], self.put_out[part])
+            self._first += part.stop - part.start
 
     def _pieces(self, n: int) -> Iterator[tuple[RigArrays, slice]]:
         """The next ``n`` samples of the rig in pieces over each of which its plant stays as it is, with its arrays."""

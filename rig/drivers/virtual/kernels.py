@@ -1,7 +1,8 @@
 """Compiled loops around the virtual rig: one block behind the DAQ contract, tick and rig fused, and the loopback channels."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,8 @@ from rig.drivers.virtual.faults import FaultArrays, convert
 from rig.tick.kernels import note_faults, note_put_out, tell_continuation, tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from rig.tick.safety.kernels import is_over
-from simulators.kernels import RigArrays, RigState, sample
-from vibrolock.compiled import kernel
+from simulators.kernels import RigArrays, RigState, addressed, rig_at, sample, state_at
+from vibrolock.compiled import bound, inner_kernel, kernel
 
 
 class Loopback(NamedTuple):
@@ -48,15 +49,15 @@ class Converters(NamedTuple):
     """Passing faults of the device."""
     releases: bool
     """Whether the rig is another while the output is exactly 0 V."""
-    released: RigArrays
-    """That other rig."""
+    released: np.ndarray
+    """That other rig, by the addresses of its arrays (`simulators.kernels.addressed`)."""
 
 
-@kernel
+@inner_kernel
 def sampled(rig: RigArrays, state: RigState, converters: Converters, voltage: float, row: np.ndarray) -> int:
     """Advance the rig by one sample: the released one while the output is 0 V, if it is to be released."""
     if converters.releases and voltage == 0.0:
-        return int(sample(converters.released, state, voltage, row))
+        return int(sample(rig_at(converters.released), state, voltage, row))
     return int(sample(rig, state, voltage, row))
 
 
@@ -74,8 +75,8 @@ def read_output(loopback: Loopback, index: int, voltage: float, row: np.ndarray)
 
 @kernel
 def exchange_block(
-    rig: RigArrays,
-    state: RigState,
+    rig_places: np.ndarray,
+    state_places: np.ndarray,
     converters: Converters,
     first: int,
     voltages: np.ndarray,
@@ -85,9 +86,11 @@ def exchange_block(
 ) -> None:
     """Swap one block with the rig; ``flags`` (uint16[n]) are the rig's for each sample.
 
-    ``first`` is the number of the block's first sample. The queue holds the outputs that the device keeps back. ``put_out``
+    Rig and state are given by the addresses of their arrays (`simulators.kernels.addressed`). ``first`` is the number of the
+    block's first sample. The queue holds the outputs that the device keeps back. ``put_out``
     (float64[n], V) is what the converter has put out in place of an output, else NaN.
     """
+    rig, state = rig_at(rig_places), state_at(state_places)
     queue, loopback = converters.queue, converters.loopback
     delay = queue.size
     sensed = inputs.shape[1] - loopback.v_per_v.size
@@ -104,6 +107,29 @@ def exchange_block(
         flags[index] = told(sampled(rig, state, converters, voltage, row[:sensed]) | raised, converters.counts)
         if flags[index] & LOST:
             row[:] = math.nan
+
+
+class Exchange:
+    """Swaps blocks with a rig, in one compiled call each whose arguments are prepared once."""
+
+    def __init__(self, rig: RigArrays, state: RigState, converters: Converters) -> None:
+        self._rig, self._kept = addressed(rig), (rig, state)
+        self._state, self._converters = addressed(state), converters
+        self._call: Callable[..., None] | None = None
+
+    def change(self, rig: RigArrays) -> None:
+        """Go on with other arrays of the rig, of the same sizes."""
+        if rig is not self._kept[0]:
+            self._rig[:], self._kept = addressed(rig), (rig, self._kept[1])
+
+    def __call__(
+        self, first: int, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray, put_out: np.ndarray
+    ) -> None:
+        """Swap a block: arguments of `exchange_block`, all of them contiguous."""
+        if self._call is None:
+            held = self._rig, self._state, self._converters
+            self._call = partial(bound(exchange_block, *held, first, voltages, inputs, flags, put_out), *held)
+        self._call(first, voltages, inputs, flags, put_out)
 
 
 @kernel

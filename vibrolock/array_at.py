@@ -1,0 +1,25 @@
+"""Arrays from addresses, inside kernels that count no references."""
+
+from typing import Any
+
+import numba.np.arrayobj
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
+
+_np: Any = numba.np.arrayobj
+_types: Any = types
+
+
+def _array_at(typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
+    array = _types.Array(dtype.dtype, shape.count if isinstance(shape, _types.BaseTuple) else 1, "C")
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+        return _np.np_cfarray(context, builder, array(_types.voidptr, shape), (place, arguments[1]))
+
+    return array(address, shape, dtype), generate
+
+
+array_at: Any = intrinsic(_array_at)
+"""``array_at(address, shape, dtype)``: the C-contiguous array at an address, valid as long as its owner lives."""
