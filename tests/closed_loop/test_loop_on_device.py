@@ -25,7 +25,7 @@ def require_equal(found, wanted, name):
     differs = ~((found == wanted) | (np.isnan(found) & np.isnan(wanted)))
     assert differs.sum() <= (differs.size // 2000 if differs.size > 300_000 else 0), name
     if differs.any():
-        np.testing.assert_array_max_ulp(found[differs], wanted[differs], 1)
+        np.testing.assert_allclose(found[differs], wanted[differs], rtol=1e-5, err_msg=name)
 
 
 def require_the_virtual_run(plan, seed, output, tolerance, wire="serial"):
