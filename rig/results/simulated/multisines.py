@@ -111,7 +111,7 @@ def _recorded_with_bands(bands: OpenBands, model: Simulator, run: SimulatedRun, 
     def counted(one: Simulator) -> Float:
         return run_of(one, experiment).outputs[:, experiment.counted_from :]
 
-    return bands.of_run(run, counted(model), counted, known=True) if bands.wanted(run.range_use) else run
+    return bands.of_run(run, counted(model), counted, known=True) if bands.wanted(run.range_use, known=True) else run
 
 
 def _simulated(

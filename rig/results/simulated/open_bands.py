@@ -26,9 +26,12 @@ class OpenBands:
     allowed: bool
     """Whether predictions without a band are allowed beyond the training data."""
 
-    def wanted(self, use: float) -> bool:
-        """Return whether a prediction with this range use gets a band: asked for, or beyond the training data."""
-        return self.asked or (use > BEYOND and not self.allowed)
+    def wanted(self, use: float, known: bool = False) -> bool:
+        """Return whether a prediction with this range use gets a band: asked for, or beyond the training data.
+
+        ``known``: it was measured, so that its errors are known.
+        """
+        return self.asked or (use > BEYOND and not self.allowed and not known)
 
     def of_run(self, run: SimulatedRun, outputs: Float, respond: Callable[[Any], Float], known: bool) -> SimulatedRun:
         """Return a run with bands; ``known``: it was measured, so that what is too uncertain is only left without.
@@ -69,7 +72,7 @@ class OpenBands:
     def _judged(
         self, name: str, use: float, known: bool, banded: Callable[[], Any]
     ) -> tuple[Any | None, tuple[str, ...]]:
-        if not self.wanted(use):
+        if not self.wanted(use, known):
             return None, ()
         if self.fit is None:
             if not known:
