@@ -16,6 +16,11 @@ if TYPE_CHECKING:
         track_saturation as track_saturation,
     )
     from controller.detector import ADAPTIVE as ADAPTIVE, detect as detect, force_rms as force_rms
+    from controller.feed_forward import (
+        add_to_backbone as add_to_backbone,
+        follow_backbone as follow_backbone,
+        forget_backbone as forget_backbone,
+    )
     from controller.frequency import follow as follow
     from controller.law import measure_phase as measure_phase
     from controller.lock import (

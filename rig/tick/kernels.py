@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from controller.feed_forward import add_to_backbone, follow_backbone, forget_backbone
 from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
 from controller.kernels import (
     ADAPTIVE,
@@ -18,11 +17,14 @@ from controller.kernels import (
     TWO_PI,
     VOLTAGE,
     add_sample,
+    add_to_backbone,
     advance_phase,
     demand,
     detect,
     follow,
+    follow_backbone,
     force_rms,
+    forget_backbone,
     held_amplitude,
     measure_phase,
     size,
