@@ -33,6 +33,8 @@ SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
 COLLECTED_S, COLLECTED_CHUNKS = 120.0, 5
 """Rows of a loop on the device that wait for a late campaign at least, s, and chunks that it takes at a time; chosen: nothing
 hurries it, and on a busy computer it may get a twentieth of a processor."""
+LOCKSTEP_S = 1.0
+"""The same of a device that waits, s; chosen: so much longer at most does a start last that a late campaign judges."""
 COLLECTED_BYTES = 256 * 2**20
 """Memory that these rows may take at most, bytes; chosen. Fewer seconds of them wait at high rates of many channels."""
 MEASUREMENTS: dict[str, Callable[..., object]] = {
@@ -132,11 +134,15 @@ def _serve_on_device(
     _, settings, ring_s = _told(commands)
     tick = Tick(settings, 1.0 + daq.loop_latency_samples)
     tick.arrays, state = packed(tick.arrays)
-    layout = collecting_layout(bench, tick.arrays, len(daq.counters), ring_s)
+    lockstep = daq.capabilities.repeatable
+    layout = (
+        Layout.of(bench, tick.arrays, len(daq.counters), LOCKSTEP_S)
+        if lockstep
+        else collecting_layout(bench, tick.arrays, len(daq.counters), ring_s)
+    )
     memory = SharedMemory(descriptor, layout, create=True)
     _ = tick.over  # loads its kernel
     came, _ = _listen()
-    lockstep = daq.capabilities.repeatable
     said = prepare(privileged=privileged and not lockstep)
     released = _released(commands)
     remote = daq.load_loop(tick.arrays, chunk_of(bench))
