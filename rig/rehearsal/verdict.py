@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializerFunctionWrapHandler, model_serializer
+from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 from rig.rehearsal.forecast import QUANTITIES
 from rig.rehearsal.rehearsal import Draw, Rehearsal
@@ -57,7 +57,7 @@ class Proportion(Statistic):
         return low if k else 0.0, high if k < n else 1.0
 
     @model_serializer(mode="wrap")
-    def _with_interval(self, fields: SerializerFunctionWrapHandler) -> dict[str, JsonValue]:
+    def _with_interval(self, fields: SerializerFunctionWrapHandler) -> dict[str, object]:
         low, high = self.interval
         return {**fields(self), "value": self.value, "low": low, "high": high}
 
