@@ -20,8 +20,8 @@ with it the noise. What that makes of points is a tenth of these."""
 
 
 def require_equal(found, wanted, name):
-    """All values are equal, but for some in 10 000 of a long run, which differ in their last bits: the virtual rig's loop is compiled
-    together with the rig, and rounds the last bits of a double otherwise."""
+    """All values are equal, but for some in 10 000 of a long run, which differ in their last bits: the virtual rig's loop is
+    compiled together with the rig, and rounds the last bits of a double otherwise."""
     differs = ~((found == wanted) | (np.isnan(found) & np.isnan(wanted)))
     assert differs.sum() <= (differs.size // 2000 if differs.size > 300_000 else 0), name
     if differs.any():
