@@ -6,7 +6,6 @@ import numpy as np
 
 from identification.continuation.newton import evaluated, solution, solved, tangent_of
 from identification.continuation.path import Steps, System
-from identification.continuation.root import root_between
 from identification.errors import IdentificationError
 from vibrolock.arrays import Float
 
@@ -131,11 +130,15 @@ class Walk:
 
     def turn(self, last: Point, step: float) -> Float | None:
         """Return the turning point within a step from ``last``; None if it is not found."""
+        from scipy.optimize import brentq
 
         def direction(length: float) -> float:
             at = self.corrected(last, length)
             return np.nan if at is None else float(at.tangent[-1])
 
-        length = root_between(direction, 0.0, step, 1e-7 * step)
-        at = None if length is None else self.corrected(last, length)
+        try:
+            length = brentq(direction, 0.0, step, xtol=1e-7 * step, rtol=1e-12)
+        except (ValueError, RuntimeError):
+            return None
+        at = self.corrected(last, length)
         return None if at is None else at.v
