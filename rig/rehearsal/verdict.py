@@ -1,6 +1,5 @@
 """Verdict of a rehearsal: probability of each end, margins, accuracy, and the unknowns that matter most."""
 
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -12,10 +11,6 @@ from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler
 from rig.rehearsal.forecast import QUANTITIES
 from rig.rehearsal.rehearsal import Draw, Rehearsal
 from rig.rehearsal.sequential import interval, unbiased
-from vibrolock.arrays import Float
-
-NORMAL_975 = 1.959963984540054
-"""Quantile of the standard normal distribution below which 97.5 % lie."""
 
 
 class Statistic(BaseModel):
@@ -51,10 +46,8 @@ class Proportion(Statistic):
             return 0.0, 1.0
         if self.stopped:
             return interval(self.count, self.of)
-        n, k, square = self.of, self.count, NORMAL_975**2
-        middle, half = k + 0.5 * square, NORMAL_975 * math.sqrt(k * (n - k) / n + 0.25 * square)
-        low, high = (middle - half) / (n + square), (middle + half) / (n + square)
-        return low if k else 0.0, high if k < n else 1.0
+        found = scipy.stats.binomtest(self.count, self.of).proportion_ci(0.95, method="wilson")
+        return float(found.low), float(found.high)
 
     @model_serializer(mode="wrap")
     def _with_interval(self, fields: SerializerFunctionWrapHandler) -> dict[str, object]:
@@ -294,27 +287,11 @@ def _influences(draws: Sequence[Draw]) -> tuple[Influence, ...]:
                 kept = np.isfinite(values) & np.isfinite(x)
                 if kept.sum() < MIN_DRAWS or np.ptp(values[kept]) == 0.0 or np.ptp(x[kept]) == 0.0:
                     continue
-                correlation, p_value = rank_correlation(x[kept], values[kept])
+                found = scipy.stats.spearmanr(x[kept], values[kept])
+                correlation, p_value = float(found.statistic), float(found.pvalue)
                 if p_value < SIGNIFICANCE / tested:
                     advice = ADVICE.get(name, "")
                     out.append(
                         Influence(outcome=outcome, unknown=of, correlation=correlation, p_value=p_value, advice=advice)
                     )
     return tuple(sorted(out, key=lambda one: -abs(one.correlation)))
-
-
-def rank_correlation(x: Float, y: Float) -> tuple[float, float]:
-    """Return Spearman's rank correlation of two columns of n numbers, and the probability of one as large by chance.
-
-    Equal numbers share their mean rank. The probability is that of Student's t with n - 2 degrees of freedom, for
-    ``t = r sqrt((n - 2)/(1 - r^2))``. The functions of `scipy.stats` take longer to import than some ten twins to run.
-    """
-    found = float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
-    free, rest = x.size - 2, (1.0 + found) * (1.0 - found)
-    t = found * math.sqrt(free / rest) if rest > 0.0 else math.inf
-    return found, 2.0 * float(scipy.special.stdtr(free, -abs(t)))
-
-
-def _ranks(values: Float) -> Float:
-    _, group, sizes = np.unique(values, return_inverse=True, return_counts=True)
-    return np.asarray((np.cumsum(sizes) - 0.5 * (sizes - 1))[group])
