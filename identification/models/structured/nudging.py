@@ -20,7 +20,6 @@ import numpy as np
 from identification.channels import MOTION_ORDER
 from identification.experiments.experiment import Experiment
 from identification.models.structured.steps import System, nudged
-from identification.signals.polyphase import low_pass, resampled_beside_a_line
 from vibrolock.arrays import Complex, Float
 
 LOWEST = 0.2
@@ -103,8 +102,8 @@ def with_lead_in_periods(experiment: Experiment, periods: int) -> Experiment:
 
 _RATIO = 0.05
 """Damping ratio of the nudging forces before the samples that count. Chosen."""
-_KAISER_BETA = 8.0
-"""Of the window of the filter that gives the inputs between samples. Chosen."""
+_WINDOW = ("kaiser", 8.0)
+"""Window of the filter that gives the inputs between samples. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +192,8 @@ def update_support(system: System, length_s: float, state: Float, sens: Float | 
 
 def ends_of_steps(inputs: Float | Sequence[Sequence[float]], steps: int) -> Float:
     """float[n steps + 1, n_inputs]: inputs between the samples, without what lies above half the sample rate."""
+    from scipy.signal import resample_poly  # only on use: it takes a second to load
+
     u = np.asarray(inputs, dtype=np.float64)
-    ends = u if steps == 1 else resampled_beside_a_line(u, steps, low_pass(20 * steps + 1, 1.0 / steps, _KAISER_BETA))
+    ends = u if steps == 1 else resample_poly(u, steps, 1, axis=1, window=_WINDOW, padtype="line")
     return np.ascontiguousarray(np.concatenate([ends, ends[:, -1:]], axis=1).T)
