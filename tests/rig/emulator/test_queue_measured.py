@@ -29,7 +29,7 @@ def emulator() -> Iterator[Emulator]:
 
 def measuring(session: WorkerSession) -> None:
     """Order a measurement that lasts for a minute if it is left alone, and wait until the device is armed for it."""
-    session._worker.send("queue", {"seconds": 60.0})
+    session._worker.send("queue", {"seconds": 60.0}, {}, False)
     wait_until(lambda: handles_signals(session.pid), "the measurement has begun")
 
 
