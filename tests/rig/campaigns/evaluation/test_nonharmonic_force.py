@@ -83,7 +83,7 @@ def test_every_campaign_under_a_lock_shows_purity_last(kind):
 )
 def test_every_campaign_under_a_lock_refuses_points_with_more_than_is_accepted(name, change):
     plan = load_plan(f"magnet-beam/{name}")
-    with rig.run(plan.model_copy(update=change | {"accepted_nonharmonic_force": 1e-6}), seed=2) as run:
+    with rig.run(plan.model_copy(update=change | {"accepted_nonharmonic_force": 1e-6}), seed=3) as run:
         points = list(run.recording.latest.values())
         skipped = run.recording.parts[-1].end["skipped"]
     for point in points:
