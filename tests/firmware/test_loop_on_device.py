@@ -249,7 +249,7 @@ def test_a_ramp_that_is_asked_for_ends_the_plan_as_in_python():
         found = host.run_until_off()
         begins = int(np.flatnonzero(found[1]["guard"] == GuardMode.RAMPING)[0])
         require_equal(found, in_python(settings, len(found[1]), at={begins: Tick.request_stop}))
-        assert begins > 2500
+        assert begins >= 2500
         guard = np.frombuffer(host.states[-1].pieces[1].data, GUARD)[0]
         assert guard["reason"] == EndReason.STOP_REQUESTED
 
