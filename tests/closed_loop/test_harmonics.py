@@ -199,16 +199,15 @@ def test_the_drive_point_moves_in_a_sine_where_its_acceleration_is_controlled():
     assert np.abs(true.ratios()).max() > 1.0  # for which the force needs harmonics
 
 
-def test_short_points_follow_the_ramp_with_a_small_error_and_say_so():
+def test_short_points_have_a_sine_at_the_end_of_their_approach_if_not_on_the_way():
     plan = changed("magnet-beam/backbone-pure", evaluation="slow-flow")
     with rig.run(plan, seed=1) as run:
-        points = true_points(run.recording, 1)
-        assert len(points) >= 9
-        assert 0.005 < worst(points) < 0.04  # a ramp of the level: an integral law lags behind
-        late = [true for true in points if np.abs(true.ratios()).max() > 0.01]
-        assert late
-        for true in late:
-            assert any("off what was wanted" in warning for warning in true.point["warnings"])
+        on_the_way, at_the_end = true_points(run.recording, 1), true_points(run.recording, 1, last_periods=2)
+    assert len(at_the_end) >= 9
+    assert 0.005 < worst(on_the_way) < 0.04  # a ramp of the level: an integral law lags behind
+    for true in at_the_end[2:]:  # the first two have forces of some ten steps of the converter
+        assert np.abs(true.ratios()).max() < 0.003
+        assert not any("off what was wanted" in warning for warning in true.point["warnings"])
 
 
 # Benches

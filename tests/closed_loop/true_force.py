@@ -1,5 +1,6 @@
 """The true force of a run on a virtual rig: its recorded output drives the same rig again, without sensor noise."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,13 +50,15 @@ def virtual_rig(bench: Bench, *, silent: bool = True) -> VirtualRig:
     return VirtualRig.model_validate(table | ({"noise_scale": 0.0} if silent else {}))
 
 
-def true_points(recording: Recording, seed: int, *, bench: Bench | None = None) -> list[TruePoint]:
-    """Return the accepted points of all parts; ``bench``: of the virtual rig, where a device stood before it."""
+def true_points(
+    recording: Recording, seed: int, *, bench: Bench | None = None, last_periods: float = math.inf
+) -> list[TruePoint]:
+    """Return the accepted points of all parts, by their ``last_periods``; ``bench`` is the virtual rig's, behind a device."""
     known = bench_of_recording(recording) if bench is None else bench
-    return [true for part in recording.parts for true in _of_part(part, known, seed)]
+    return [true for part in recording.parts for true in _of_part(part, known, seed, last_periods)]
 
 
-def _of_part(part: Part, bench: Bench, seed: int) -> list[TruePoint]:
+def _of_part(part: Part, bench: Bench, seed: int, last_periods: float) -> list[TruePoint]:
     rig = virtual_rig(bench)
     output_v = part.rows("output_v").astype(float)  # on the converter up to the row's instant
     series = Simulation(rig, seed=seed).run(np.append(output_v[1:], output_v[-1]))
@@ -66,7 +69,9 @@ def _of_part(part: Part, bench: Bench, seed: int) -> list[TruePoint]:
     for point in part.points:
         if not point["accepted"]:
             continue
-        rows = slice(point["first_sample"] - (part.first_sample or 0), point["end_sample"] - (part.first_sample or 0))
+        end = point["end_sample"] - (part.first_sample or 0)
+        first = point["first_sample"] - (part.first_sample or 0)
+        rows = slice(round(max(first, end - last_periods * bench.sample_rate_hz / point["frequency_hz"])), end)
         values = np.stack([series.force_n[rows], series.displacement_m[rig.stinger.at][rows]])
         highest = min(HIGHEST, int(BELOW_NYQUIST * bench.sample_rate_hz / point["frequency_hz"]))
         harmonics = fitted(theta[rows], values, highest)
