@@ -26,7 +26,7 @@ def experiment(model, rms_n: float, ahead: int = 1) -> Experiment:
 
 
 def test_the_force_is_that_of_the_mean_displacement_and_changes_no_line_of_the_period():
-    """Against the same beam without a support, under a force with that mean; a slider that never slips would remember the way."""
+    """Against the same beam without a support, under a force with that mean; without sliders that would remember the way."""
     elements = beam().elements[:1]
     model = beam(support_n_m=3000.0, elements=elements)
     found = model.simulate_experiment(experiment(model, 3.0))
