@@ -102,7 +102,7 @@ def test_the_slip_of_a_slider_that_never_slips_has_no_effect_on_the_data(slip, u
     test = ModalTest(parameters, linear_modes(true, 1), linear)
     vector = parameters.vector(true)
     problem = Problem(parameters, [data], [None], test, 0.01, FitWatch(None, 1, 1))
-    covariance, _, unseen = problem.uncertainty(vector)
+    covariance, _, unseen, *_ = problem.uncertainty(vector)
     named = [name for name, one in zip(parameters.names, unseen, strict=True) if one]
     found = {one.name: one.unknown for one in fitted_numbers(parameters, vector, covariance, named)}
     assert found["element 1 jenkins slip"] == unknown
