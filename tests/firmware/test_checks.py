@@ -16,7 +16,7 @@ RUNS = 10_000
 """Inputs in all; the long run has ten million."""
 REQUESTS = 5000
 LEAST_BRANCHES = 83.0
-"""Per cent, with so few requests and inputs; those of the long run are at least 95. Some belong to a loop, which is not linked in."""
+"""Per cent, with so few requests and inputs; those of the long run are at least 95. Some are a loop's, which is not linked."""
 
 
 LEAST_BRANCHES_OF_LOOP = 70.0
