@@ -30,12 +30,11 @@ def forked(function: Callable[[Item], Result], items: Sequence[Item], processes:
     """Yield ``function(item)`` of every item in their order, computed in forked processes; raises what ``function`` raises.
 
     ``function`` is not sent; items and results are. If the iterator is closed early, items that have not begun are dropped, and
-    those that have begun are ended.
+    those that have begun are waited for.
     """
     pool = ProcessPoolExecutor(
         min(processes, len(items)) or 1, multiprocessing.get_context("fork"), _begin, (function, os.getpid())
     )
-    others = set(multiprocessing.active_children())
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside other threads
@@ -43,11 +42,7 @@ def forked(function: Callable[[Item], Result], items: Sequence[Item], processes:
         futures.reverse()
         while futures:
             yield futures.pop().result()
-    except BaseException:  # nobody waits for what is under way
-        for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
-        raise
-    finally:
+    finally:  # what is under way ends by itself: a process that is ended while it hands over a result leaves its lock taken
         pool.shutdown(wait=True, cancel_futures=True)
 
 
