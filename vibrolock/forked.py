@@ -30,7 +30,7 @@ def forked(function: Callable[[Item], Result], items: Sequence[Item], processes:
     """Yield ``function(item)`` of every item in their order, computed in forked processes; raises what ``function`` raises.
 
     ``function`` is not sent; items and results are. If the iterator is closed early, items that have not begun are dropped, and
-    those that have begun are waited for.
+    those that have begun are ended.
     """
     pool = ProcessPoolExecutor(
         min(processes, len(items)) or 1, multiprocessing.get_context("fork"), _begin, (function, os.getpid())
@@ -42,7 +42,11 @@ def forked(function: Callable[[Item], Result], items: Sequence[Item], processes:
         futures.reverse()
         while futures:
             yield futures.pop().result()
-    finally:  # what is under way ends by itself: a process that is ended while it hands over a result leaves its lock taken
+    except BaseException:  # nobody waits for what is under way; all are killed, for one that dies may leave a lock taken
+        for process in [*pool._processes.values()]:
+            process.kill()
+        raise
+    finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
