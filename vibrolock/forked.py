@@ -42,7 +42,7 @@ def forked(function: Callable[[Item], Result], items: Sequence[Item], processes:
         futures.reverse()
         while futures:
             yield futures.pop().result()
-    except BaseException:  # nobody waits for what is under way; all are killed, for one that dies may leave a lock taken
+    except BaseException:  # nobody waits for what is under way, and one that dies may leave a lock taken: all are killed
         for process in [*pool._processes.values()]:
             process.kill()
         raise

@@ -217,10 +217,11 @@ static uint32_t next_of(uint32_t *turn, uint32_t n)
 
 enum { OFF = 3 }; /* of the guard: the host counts how long the output has been off */
 
-/* A state is due with every so manieth block, with one in which a segment has ended or the guard has changed, and once it is off. */
+/* A state is due with every so manieth block, with one in which a segment has ended or begun or the guard has changed, and once it is
+   off. A segment that begins with a block has its first sample in the state of that block, not in that of the one before. */
 static bool is_due(void)
 {
-    const int64_t segment = (int64_t)t.progress->segment, mode = (int64_t)t.guard->mode;
+    const int64_t segment = 2 * (int64_t)t.progress->segment + (int64_t)t.progress->entered, mode = (int64_t)t.guard->mode;
     if (++untold_blocks < vl_in_force.state_blocks && segment == segment_told && mode == mode_told && mode != OFF)
         return false;
     untold_blocks = 0;

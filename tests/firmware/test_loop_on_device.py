@@ -154,6 +154,19 @@ def test_a_state_comes_with_every_so_manieth_block_and_with_one_in_which_a_segme
     assert len(told - due) <= len(settings.segments)  # segments within the tick go on with the next sample's row
 
 
+def test_the_first_sample_of_a_segment_that_begins_with_a_block_is_told_with_that_block():
+    """Blocks of one sample: every segment begins with one, and ends with the one before."""
+    settings = all_kinds()
+    with loop_host("host") as host:
+        host.begin(tick_for(settings, host.plant).arrays, block=1, state_blocks=1000)
+        rows = host.run_until_off()[1]
+        told = {state.sample for state in host.states}
+    # the row at which a segment ends has the next one's number, which begins with the sample after it
+    begins = [int(np.argmax(rows["segment"] == k)) + 1 for k in range(1, len(settings.segments))]
+    assert len(set(begins)) > 5
+    assert {begin + 1 for begin in begins} <= told
+
+
 def test_it_tells_the_digest_of_the_loop_that_is_linked_in_and_its_room():
     with loop_host() as host:
         host.set_up(loop=0)

@@ -9,7 +9,6 @@ import numpy as np
 
 from rig.drivers.wire.connection import Connection
 from rig.drivers.wire.dialogue import why_not
-from rig.drivers.wire.facts import DeviceFacts
 from rig.drivers.wire.incoming import Incoming
 from rig.drivers.wire.options import WireOptions, loop_watchdog_s
 from rig.drivers.wire.streaming import FLAG_NAMES, set_up
@@ -48,7 +47,7 @@ REASONS = {
 def why_no_rows(connection: Connection, n_channels: int, rate_hz: float, block: int) -> str:
     """Why the wire does not carry the rows of a loop on the device, with the sum; empty if it does."""
     assert connection.facts is not None
-    stream = _stream(n_channels, block, rate_hz, connection.facts)
+    stream = _stream(n_channels, block, rate_hz, connection.facts.bits)
     if why := connection.link.why_no_rows(stream):
         return why
     if connection.lacks_room:
@@ -58,10 +57,9 @@ def why_no_rows(connection: Connection, n_channels: int, rate_hz: float, block: 
     return connection.why_not_carried(stream)
 
 
-def _stream(n_channels: int, block: int, rate_hz: float, facts: DeviceFacts) -> Stream:
-    """Rows with a state every `STATE_EVERY_S`; in lockstep, where a wire carries anything, with every block."""
-    state_blocks = 1 if facts.repeatable else max(1, math.floor(STATE_EVERY_S * rate_hz / block))
-    return Stream(n_channels, block, rate_hz, facts.bits, 1, True, state_blocks)
+def _stream(n_channels: int, block: int, rate_hz: float, bits: int) -> Stream:
+    state_blocks = max(1, math.floor(STATE_EVERY_S * rate_hz / block))
+    return Stream(n_channels, block, rate_hz, bits, 1, True, state_blocks)
 
 
 def why_no_room(connection: Connection, sizes: Mapping[str, int]) -> str:
@@ -95,7 +93,7 @@ class RemoteLoop:
         connection.set(Parameter.LOOP, 1, "driver.options.loop", 1, "")
         self.block = min(block, self._dialogue.get(Parameter.LARGEST_BLOCK))
         """Rows that the device sends at a time."""
-        stream = _stream(len(facts.names), self.block, rate_hz, facts)
+        stream = _stream(len(facts.names), self.block, rate_hz, facts.bits)
         tells = self._dialogue.ask(Command.SET, Parameter.STATE_BLOCKS, value=stream.state_blocks)
         if tells.status != Status.DONE:  # it tells its state with every block
             stream = stream._replace(state_blocks=1)

@@ -34,8 +34,7 @@ COLLECTED_S, COLLECTED_CHUNKS = 120.0, 5
 """Rows of a loop on the device that wait for a late campaign at least, s, and chunks that it takes at a time; chosen: nothing
 hurries it, and on a busy computer it may get a twentieth of a processor."""
 LOCKSTEP_S = 40.0
-"""The same in lockstep, s; chosen: a start that a late campaign judges may last so much longer, and with less of it the
-device's own memory overflowed while the ring was full."""
+"""The same in lockstep, s; chosen. A start that a late campaign judges may last so much longer."""
 COLLECTED_BYTES = 256 * 2**20
 """Memory that these rows may take at most, bytes; chosen. Fewer seconds of them wait at high rates of many channels."""
 MEASUREMENTS: dict[str, Callable[..., object]] = {
