@@ -42,8 +42,8 @@ def forked(function: Callable[[Item], Result], items: Sequence[Item], processes:
         futures.reverse()
         while futures:
             yield futures.pop().result()
-    except BaseException:  # nobody waits for what is under way, and one that dies may leave a lock taken: all are killed
-        for process in [*pool._processes.values()]:
+    except BaseException:  # nobody waits for what is under way
+        for process in [*pool._processes.values()]:  # all: one that dies may leave a lock taken for which another waits
             process.kill()
         raise
     finally:
