@@ -11,14 +11,10 @@ Rigs and functions are sent to the workers, and results come back. Nothing else 
 number of rigs if results are small and consumed as they arrive.
 """
 
-import os
 from collections.abc import Callable, Generator, Iterable, Mapping
-from functools import partial
 from typing import TypeVar
 
 from joblib import Parallel, delayed
-
-from vibrolock.forked import AVAILABLE, forked
 
 __all__ = ["VariantError", "ensemble"]
 
@@ -35,7 +31,6 @@ def ensemble(
     function: Callable[[Variant], Result],
     *,
     n_jobs: int | None = None,
-    forks: bool = False,
 ) -> Generator[tuple[str, Result], None, None]:
     """Yield ``(name, function(variant))`` for every variant, in their order, as results arrive.
 
@@ -52,21 +47,10 @@ def ensemble(
         of a run, not the run.
     n_jobs
         As in joblib: a number of workers, -1 for all cores, None for the setting of `joblib.parallel_config`, or else 1.
-    forks
-        Whether a given number of workers above 1 are copies of this process on Linux, rather than joblib's: they start within
-        milliseconds, with all that is loaded here. The function must neither print nor write, nor need a thread's lock.
     """
     named = variants.items() if isinstance(variants, Mapping) else enumerate(variants)
-    if forks and AVAILABLE and n_jobs not in (None, 1):
-        workers = n_jobs if n_jobs > 0 else max(1, len(os.sched_getaffinity(0)) + 1 + n_jobs)
-        yield from forked(partial(_named_outcome, function), [(str(name), variant) for name, variant in named], workers)
-        return
     calls = (delayed(_outcome)(function, str(name), variant) for name, variant in named)
     yield from Parallel(n_jobs=n_jobs, return_as="generator")(calls)
-
-
-def _named_outcome(function: Callable[[Variant], Result], named: tuple[str, Variant]) -> tuple[str, Result]:
-    return _outcome(function, *named)
 
 
 def _outcome(function: Callable[[Variant], Result], name: str, variant: Variant) -> tuple[str, Result]:

@@ -277,7 +277,7 @@ def rehearse(
     for count, draw in enumerate(done.values(), 1):
         progress(draw, count)
     missing = [number for number in range(request.draws) if number not in done]
-    results = ensemble({str(number): number for number in missing}, request, n_jobs=jobs, forks=True)
+    results = ensemble({str(number): number for number in missing}, request, n_jobs=jobs)
     draws: list[Draw] = []
     with closing(results):
         for number in range(request.draws):

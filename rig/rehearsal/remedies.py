@@ -214,4 +214,4 @@ def _changed(plan: Plan, changes: Table, bench: Bench) -> Plan | None:
 
 
 def _rerun(request: RehearsalRequest, sample: Sequence[Draw], jobs: int | None) -> list[Draw]:
-    return [draw for _, draw in ensemble({str(d.number): d.number for d in sample}, request, n_jobs=jobs, forks=True)]
+    return [draw for _, draw in ensemble({str(d.number): d.number for d in sample}, request, n_jobs=jobs)]

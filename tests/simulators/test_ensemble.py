@@ -1,9 +1,7 @@
-import multiprocessing
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,6 @@ from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
 from tests.refused import refused
 from tests.waiting import LONG_S, wait_until
-from vibrolock.forked import AVAILABLE
 
 
 @numba.cfunc("float64(float64, CPointer(float64))")
@@ -77,26 +74,14 @@ def test_variants_are_taken_as_workers_come_free_and_not_all_at_once() -> None:
     assert len(taken) < 100
 
 
-@pytest.mark.parametrize("forks", [False, True])
 @pytest.mark.parametrize("n_jobs", [1, 2])
-def test_failing_variant_is_named(n_jobs: int, forks: bool) -> None:
+def test_failing_variant_is_named(n_jobs: int) -> None:
     with refused(VariantError, "variant-stiff-zerodivisionerror-float-division-by"):
-        list(ensemble({"soft": 2.0, "stiff": 0.0}, reciprocal, n_jobs=n_jobs, forks=forks))
-
-
-@pytest.mark.skipif(not AVAILABLE, reason="this system forks no processes")
-def test_copies_of_this_process_need_no_function_that_can_be_sent_and_end_with_the_iterator() -> None:
-    before = set(multiprocessing.active_children())
-    results = ensemble([0.0, 60.0, 60.0, 0.0], lambda seconds: (time.sleep(seconds), os.getpid()), n_jobs=2, forks=True)
-    name, (_, process) = next(results)
-    assert name == "0"
-    assert process != os.getpid()
-    results.close()
-    assert set(multiprocessing.active_children()) == before
+        list(ensemble({"soft": 2.0, "stiff": 0.0}, reciprocal, n_jobs=n_jobs))
 
 
 SLEEPER = """
-import os, signal, sys, time
+import os, signal, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job begins with it ignored
 from simulators.ensemble import ensemble
 
@@ -105,21 +90,16 @@ def slow(value):
     time.sleep(60.0)
 
 if __name__ == "__main__":
-    list(ensemble(range(50), slow, n_jobs=2, forks=sys.argv[1] == "forks"))
+    list(ensemble(range(50), slow, n_jobs=2))
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGINT for a group of processes")
-@pytest.mark.parametrize("workers", ["joblib", "forks"])
-def test_interrupt_ends_it_and_leaves_no_worker(tmp_path: Path, workers: str) -> None:
+def test_interrupt_ends_it_and_leaves_no_worker(tmp_path: Path) -> None:
     script = tmp_path / "sleeper.py"
     script.write_text(SLEEPER)
     with subprocess.Popen(
-        [sys.executable, script, workers],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        [sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:
         assert running.stdout is not None
         assert running.stdout.readline() == "begun\n"
