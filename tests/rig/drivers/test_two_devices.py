@@ -40,7 +40,7 @@ def asked(host: Dialogue, count: int) -> list[int]:
     return [host.ask(Command.GET, 1, item).value for item in range(count)]
 
 
-@pytest.mark.parametrize("behind", [1, 3, 10])
+@pytest.mark.parametrize("behind", [1, 3, 10, 200])
 def test_a_device_that_is_some_requests_behind_the_other_is_noticed(behind):
     host = dialogue(behind, other=8)
     with refused(DaqProtocol, "two-devices"):
@@ -51,3 +51,20 @@ def test_answers_that_a_wire_repeats_now_and_then_are_no_second_device():
     host = dialogue(3, other=7)
     assert asked(host, 7) == [7] * 7
     assert host.stray_answers == 4
+
+
+def test_a_late_answer_to_a_request_that_was_repeated_is_no_second_device():
+    class Slow(Twice):
+        """Answers to the first request once it is sent again, and then to both with what it reads meanwhile."""
+
+        def send(self, request: Request) -> None:
+            answer = Answer(request.number, Status.DONE, request.parameter, request.item, 7)
+            self.late.append(answer)
+            if len(self.late) == 2:
+                self.waiting.extend((answer, answer._replace(value=8)))
+            elif len(self.late) > 2:
+                self.waiting.append(answer)
+
+    host = Dialogue(Slow(0, 0), lambda: 0.0)  # type: ignore[arg-type]
+    assert asked(host, 3) == [7] * 3
+    assert host.stray_answers == host.retries == 1

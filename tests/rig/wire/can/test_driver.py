@@ -20,7 +20,7 @@ from rig.wire.can.slcan import SlcanBus
 from rig.wire.messages import Parameter
 from rig.wire.serial.port import open_pseudo_terminal
 from tests.refused import refused
-from tests.rig.wire.can.devices import bench_on, device_on
+from tests.rig.wire.can.devices import bench_on, device_on, two_devices_on
 
 
 def virtual_bus(channel: str, fd: bool, node: int = 1) -> PythonCanBus:
@@ -110,8 +110,7 @@ def test_a_block_beyond_the_sequence_numbers_is_refused_when_opening() -> None:
 def test_two_devices_under_one_node_are_noticed() -> None:
     channel = uuid4().hex
     with (
-        device_on(virtual_bus(channel, True), True),
-        device_on(virtual_bus(channel, True), True, serial_number="0002"),
+        two_devices_on(virtual_bus(channel, True), virtual_bus(channel, True)),
         refused(DaqProtocol, "two-devices"),
     ):
         CanDAQ(bench_on("virtual", channel)).open()
