@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         Stop as Stop,
         UserSpring as UserSpring,
     )
+    from identification.models.structured.extrapolation import check_response as check_response
     from identification.models.structured.open_quantities import (
         check_input as check_input,
         peak_band as peak_band,

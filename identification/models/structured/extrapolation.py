@@ -44,6 +44,19 @@ def judged_by_input(model: StructuredModel, response: SteadyPrediction) -> Stead
     return replace(response, range_use=response.range_use * (use / own), notes=(*response.notes, said))
 
 
+def check_response(model: StructuredModel, response: SteadyPrediction) -> float:
+    """Return the use of the training data by a response's force (`response_use`).
+
+    Raises `ExtrapolationError` for a response that ends before its peak, or whose force is above twice that of the training data.
+    """
+    use = response_use(model, response)
+    if not response.peak_reached():
+        raise _refused(response, use, "its model leaves the range that is allowed before the peak")
+    if use > LARGEST_INPUT_USE * ROUNDING:
+        raise _refused(response, use, f"above {LARGEST_INPUT_USE:g} nothing is known of the error")
+    return use
+
+
 def with_what_is_open(
     fit: StructuredFit,
     band: ResponseBand,
@@ -65,11 +78,7 @@ def with_what_is_open(
     respond
         The same response of another model, however far it goes.
     """
-    use = response_use(fit.model, response)
-    if not response.peak_reached():
-        raise _refused(response, use, "its model leaves the range that is allowed before the peak")
-    if use > LARGEST_INPUT_USE * ROUNDING:
-        raise _refused(response, use, f"above {LARGEST_INPUT_USE:g} nothing is known of the error")
+    use = check_response(fit.model, response)
     families: dict[str, list[SteadyPrediction]] = {}
     for family, model in alternatives(fit.model):
         try:

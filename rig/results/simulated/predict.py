@@ -18,7 +18,7 @@ from identification import (
     frequency_response,
 )
 from identification.harmonic_balance import Held
-from identification.models import check_input
+from identification.models import check_input, check_response
 from identification.prediction import band_of_responses
 from rig.errors import ConfigurationError
 from rig.results.files import load, load_as
@@ -108,8 +108,9 @@ def _wanted(open_: OpenBands | None, response: SteadyPrediction) -> bool:
     use = float(np.nanmax(response.range_use, initial=0.0))
     if open_ is None or not open_.wanted(use):
         return False
-    if response.peak_reached() or open_.fit is None:
-        check_input(response.name, use)
+    if open_.fit is not None:
+        check_response(open_.fit.model, response)
+    check_input(response.name, use)
     return open_.fit is not None
 
 
