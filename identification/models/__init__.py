@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from identification.models.pnlss.features import FUNCTIONS as FUNCTIONS
     from identification.models.pnlss.user_functions import is_users as is_users
     from identification.models.simulated_runs import run_of as run_of
+    from identification.models.structured.extrapolation import check_response as check_response
     from identification.models.structured.fit import drawn as drawn, std_of as std_of
     from identification.models.structured.identified import FittedNumber as FittedNumber
     from identification.models.structured.laws import (
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
         Stop as Stop,
         UserSpring as UserSpring,
     )
-    from identification.models.structured.extrapolation import check_response as check_response
     from identification.models.structured.open_quantities import (
         check_input as check_input,
         peak_band as peak_band,

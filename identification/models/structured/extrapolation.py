@@ -47,7 +47,7 @@ def judged_by_input(model: StructuredModel, response: SteadyPrediction) -> Stead
 def check_response(model: StructuredModel, response: SteadyPrediction) -> float:
     """Return the use of the training data by a response's force (`response_use`).
 
-    Raises `ExtrapolationError` for a response that ends before its peak, or whose force is above twice that of the training data.
+    Raises `ExtrapolationError` for a response that ends before its peak, or with a force above twice that of the training data.
     """
     use = response_use(model, response)
     if not response.peak_reached():
