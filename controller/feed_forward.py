@@ -12,6 +12,9 @@ BACKBONE = record(i8="points", f8="level level_1 omega_1 level_2 omega_2 level_3
 ``level``: the level at the last sample, in the unit of the plan's levels."""
 
 LARGEST_RATIO = 3.0  # of the slope to that between the last two levels: the parabola is not believed beyond
+NEAREST = (
+    0.25  # of a step of the level: levels nearer to each other than this tell no slope for it, for noise is multiplied
+)
 
 
 @inner_kernel
@@ -33,15 +36,18 @@ def add_to_backbone(state: Record, level: float, omega: float) -> None:
 
 
 @inner_kernel
-def backbone_slope(state: Record, level: float) -> float:
-    """Return the change of frequency for the level, rad/s per unit of the level, at ``level``.
+def backbone_slope(state: Record, level: float, target: float) -> float:
+    """Return the change of frequency for the level, rad/s per unit of the level, at ``level`` on the way to ``target``.
 
-    It has the sign of the slope between the last two levels, and at most `LARGEST_RATIO` times its size.
+    It has the sign of the slope between the last two levels, and at most `LARGEST_RATIO` times its size. It is 0 where these
+    are nearer to each other than `NEAREST` times the step to the target, as the start's level and the first one may be.
     """
-    if state.points < 2:
+    apart, step = abs(state.level_1 - state.level_2), abs(target - state.level_1)
+    if state.points < 2 or apart < NEAREST * step:
         return 0.0
     slope = (state.omega_1 - state.omega_2) / (state.level_1 - state.level_2)
-    if state.points < 3 or slope == 0.0 or state.level_3 in (state.level_1, state.level_2):
+    nearest = min(abs(state.level_2 - state.level_3), abs(state.level_1 - state.level_3))
+    if state.points < 3 or slope == 0.0 or nearest < NEAREST * apart:
         return float(slope)
     earlier = (state.omega_2 - state.omega_3) / (state.level_2 - state.level_3)
     curvature = (slope - earlier) / (state.level_1 - state.level_3)
@@ -50,8 +56,8 @@ def backbone_slope(state: Record, level: float) -> float:
 
 
 @inner_kernel
-def follow_backbone(state: Record, frequency: Record, level: float, ramps: bool) -> None:
-    """Move the integral of the frequency law for the change of the level since the last sample, if the level ``ramps``."""
+def follow_backbone(state: Record, frequency: Record, level: float, target: float, ramps: bool) -> None:
+    """Move the integral of the frequency law for the change of the level since the last sample, if it ``ramps`` to a target."""
     if ramps:
-        frequency.integral += backbone_slope(state, 0.5 * (level + state.level)) * (level - state.level)
+        frequency.integral += backbone_slope(state, 0.5 * (level + state.level), target) * (level - state.level)
     state.level = level

@@ -37,8 +37,9 @@ THRESHOLDS = record(
 
 LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained", f8="slowing")
 """State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
-``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``gained``: there has been a lock
-before; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower."""
+``net_out_of_band_periods``: periods out of the band less those in it, at a held level or in a ramp that waits; ``gained``:
+there has been a lock before; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp
+slower."""
 
 
 class LockRule(Settings):
@@ -76,13 +77,15 @@ class LockRule(Settings):
 
 
 @kernel
-def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool, error: float) -> None:
+def next_lock_state(
+    lock: Record, thresholds: Record, present: bool, held: bool, error: float, waits: bool = False
+) -> None:
     """Advance the lock state by one oscillator period, given the period's mean phase error (rad).
 
     ``present``: force and response exceed the smallest amplitudes whose phase can be read.
     ``held``: the level is not being ramped; only then does a large error count towards a lost lock. A phase that swings through
     zero and is far most of the time is lost too, after three times as many periods, for a knock makes it swing as well; also
-    where a ramp has shaken the lock off before.
+    where a ramp has shaken the lock off before, and in one that ``waits`` for the phase.
     """
     size = abs(error)
     if not present:
@@ -99,7 +102,7 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
         lock.state = ACQUIRING
     lock.in_band_periods = lock.in_band_periods + 1 if size < thresholds.locked_rad else 0
     lock.slowing = min(max(2.0 * size / thresholds.waiting_rad - 1.0, 0.0), 1.0)
-    if not held:
+    if not (held or waits):
         lock.net_out_of_band_periods = 0
     elif size > thresholds.lost_rad:
         lock.net_out_of_band_periods += 1

@@ -196,7 +196,8 @@ def choose_frequency(t: TickArrays) -> None:
     if t.law[0].frequency.feed_forward == 1:
         ramps = loop.drive == Drive.LOOP and loop.held == 0 and progress.returning == 0
         follows = ramps and control.lock.state != LOST_LOCK and control.frequency.clamped == 0
-        follow_backbone(control.backbone, control.frequency, progress.level, follows)
+        target = t.segments[progress.segment].level if progress.entered == 1 else progress.level
+        follow_backbone(control.backbone, control.frequency, progress.level, target, follows)
     if loop.drive == Drive.WAVEFORM:
         control.frequency.omega = TWO_PI / (t.waveforms.shape[1] * loop.dt_s)
     elif loop.drive == Drive.TONE:

@@ -10,6 +10,7 @@ from rig.tick.safety.kernels import shut_down
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.response_plausibility import check_held_level, evaluate_exciter, silent_side
 from rig.tick.sequencer.judgement import judge_period
+from rig.tick.sequencer.kernels import waits_for_phase
 from rig.tick.sequencer.layout import Drive, SegmentKind
 from vibrolock.compiled import kernel
 
@@ -89,7 +90,9 @@ def close_period(t: TickArrays) -> None:
         period.error_rad = math.nan
     open_loop = loop.drive == Drive.TONE
     if not open_loop:
-        next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad)
+        progress = t.progress[0]
+        waits = progress.entered == 1 and waits_for_phase(progress, t.segments[progress.segment])
+        next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad, waits)
     # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
     saturated = amplitude.output.saturation_sign != 0 and amplitude.law == VOLTAGE
     locked = (open_loop or lock.state == LOCKED) and not saturated

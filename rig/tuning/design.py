@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
@@ -108,17 +109,8 @@ def choose(
         allowed.insert(0, largest_low_pass_rad_s)
     if law == "phase":
         return _phase(plant, allowed[0], noise)
-    tried = 0
-    best = None
-    for candidate in sorted(_candidates(plant, allowed), key=lambda one: -one.worth):
-        if best is not None and candidate.worth < best.worth - MAX_SLOPE_LOSS:
-            break
-        tried += 1
-        if (best is None or candidate.quickness > best.quickness) and (
-            suited := _suits(candidate.loop, plant, responses)
-        ):
-            best, design = candidate, suited
-    if best is None:
+    tried, best, design = _quickest(_candidates(plant, allowed), lambda loop: _suits(loop, plant, responses))
+    if best is None or design is None:
         raise _unsuited(plant, responses, allowed[-1], tried)
     w, share = best.loop.low_pass_rad_s, best.share
     others = [assess(replace(best.loop, plant=other)) for other in _damped(plant)[1:]]
@@ -179,6 +171,24 @@ def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candi
         slopes = min(softening, softer), min(hardening, harder)
         out.append(_Candidate(loop, share, proportional, response, cancels, slopes))
     return out
+
+
+def _quickest(
+    candidates: list[_Candidate], suits: Callable[[ControlLoop], Design | None]
+) -> tuple[int, _Candidate | None, Design | None]:
+    """Return the number of candidates tried, and of those that suit the quickest, with its assessment.
+
+    It bears at most `MAX_SLOPE_LOSS` less of the wanted range than the one that bears most of it.
+    """
+    tried, least, best, design = 0, -math.inf, None, None
+    for candidate in sorted(candidates, key=lambda one: -one.worth):
+        if candidate.worth < least:
+            break
+        tried += 1
+        if (best is None or candidate.quickness > best.quickness) and (suited := suits(candidate.loop)):
+            least = candidate.worth - MAX_SLOPE_LOSS if best is None else least
+            best, design = candidate, suited
+    return tried, best, design
 
 
 def _damped(plant: PlantModel) -> list[PlantModel]:

@@ -119,9 +119,9 @@ def _lock():
     return np.zeros(1, LOCK), thresholds
 
 
-def _periods(lock, thresholds, count, error_deg, present=True, held=True):
+def _periods(lock, thresholds, count, error_deg, present=True, held=True, waits=False):
     for _ in range(count):
-        next_lock_state(lock[0], thresholds[0], present, held, math.radians(error_deg))
+        next_lock_state(lock[0], thresholds[0], present, held, math.radians(error_deg), waits)
     return LockState(int(lock["state"][0]))
 
 
@@ -158,6 +158,19 @@ def test_a_lock_that_a_ramp_shakes_off_is_sought_again_and_not_a_loss():
     _periods(lock, thresholds, 10, 0.0)
     assert _periods(lock, thresholds, 100, 50.0, held=False) is LockState.ACQUIRING
     assert _periods(lock, thresholds, 10, 0.0) is LockState.LOCKED
+
+
+def test_a_phase_that_swings_in_a_ramp_that_waits_for_it_is_a_lost_lock():
+    swing_deg = 80.0 * np.sin(2 * np.pi * (np.arange(200) + 0.5) / 9)
+    for waits, expected in ((True, LockState.LOST), (False, LockState.ACQUIRING)):
+        lock, thresholds = _lock()
+        _periods(lock, thresholds, 10, 0.0)
+        states = [_periods(lock, thresholds, 1, error, held=False, waits=waits) for error in swing_deg]
+        assert states[-1] is expected
+    lagging, _ = _lock()
+    _periods(lagging, thresholds, 10, 0.0)
+    assert _periods(lagging, thresholds, 55, 50.0, held=False, waits=True) is LockState.ACQUIRING
+    assert _periods(lagging, thresholds, 10, 0.0, held=False, waits=True) is LockState.LOCKED
 
 
 def test_a_large_error_before_the_first_lock_is_no_loss():

@@ -165,13 +165,13 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
 
 
 @kernel
-def slowing(progress: Record, segment: Record, lock: Record) -> float:
-    """Return by how much of its rate (0 to 1) an upward ramp is slower, by the phase error of a loop that has been locked.
+def waits_for_phase(progress: Record, segment: Record) -> bool:
+    """Return whether a segment is an upward ramp that waits for the phase of a loop that has been locked.
 
     Sweeps of the level do not wait.
     """
-    waits = segment.kind == SegmentKind.RAMP and segment.drive == Drive.LOOP and progress.unlocked == 0
-    return float(lock.slowing) if waits else 0.0
+    climbs = segment.kind == SegmentKind.RAMP and segment.level > progress.level
+    return bool(climbs and segment.drive == Drive.LOOP and progress.unlocked == 0)
 
 
 @kernel
@@ -252,7 +252,7 @@ def step_ramp(
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.OUTSIDE_WINDOW)
     elif progress.frozen_cycles >= SATURATED_PERIODS:
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.UNREACHABLE)
-    elif progress.waited_cycles >= LONGEST_WAIT:
+    elif progress.waited_cycles >= LONGEST_WAIT or (lock.state == LOST and waits_for_phase(progress, segment)):
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.LOST_LOCK)
 
 
@@ -299,7 +299,7 @@ def advance(
     if climbs and progress.unreached == 1:
         progress.frozen_cycles += passed
     elif climbs:
-        progress.waited_cycles += passed * slowing(progress, segment, lock)
+        progress.waited_cycles += passed * (lock.slowing if waits_for_phase(progress, segment) else 0.0)
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
         step_ramp(progress, segments, outcomes, settling, lock, guard, elapsed)

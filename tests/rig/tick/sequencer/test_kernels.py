@@ -241,6 +241,16 @@ def test_a_ramp_that_waits_in_vain_has_lost_the_lock():
     assert walk.go(2.0).codes()[1] == "LOST_LOCK"
 
 
+def test_a_ramp_up_whose_lock_is_lost_on_the_way_ends_at_once_and_one_down_goes_on():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0, point=0, on_lost_lock=OnFailure.SKIP), _ramp(0.5, 10.0, point=1)).go(
+        6
+    )
+    walk.lock["state"] = LockState.LOST
+    assert walk.go(0.1).codes()[1:] == ["LOST_LOCK", "RUNNING"]
+    walk.lock["state"] = LockState.LOST
+    assert walk.go(31.0).codes()[2] == "DONE"
+
+
 def test_after_a_lost_lock_higher_levels_are_left_out_and_the_next_ramp_begins_where_a_lock_was_held():
     skipped = Walk(
         _held(1.0, 5.0),

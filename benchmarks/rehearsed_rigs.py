@@ -1,0 +1,262 @@
+"""Is what a rehearsal foresees what happens? Random rigs by kind: tune, rehearsal, three runs with other noise.
+
+- ``python -m benchmarks.rehearsed_rigs run FOLDER --seed 1 --each 8`` draws rigs (`benchmarks.random_rigs`) from a seed until
+  there are so many of each kind, with stops, with joints and smooth ones (cubic springs, magnets), and tries those that have no
+  result yet,
+- ``python -m benchmarks.rehearsed_rigs table FOLDER ...`` shows reliability and Brier score by kind, what was foreseen and what
+  happened, and the largest phase error in ramps, with the feed-forward of the frequency and without it.
+
+Several folders count as one batch.
+"""
+
+import json
+import math
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+import typer
+
+import rig
+from benchmarks.random_rigs import _compared, _truth, drawn
+from rig.arming.run_options import RunOptions
+from rig.bench import load_bench
+from rig.campaigns.evaluation.recorded import points_of
+from rig.errors import RigError
+from rig.recording.reader import Recording
+from rig.rehearsal.knowledge import collect_knowledge
+from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
+from rig.rehearsal.verdict import verdict_of
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tuning import tune
+
+KINDS = {"clearance": "stops", "jenkins": "joints", "iwan": "joints"}
+DRAWS, RUNS = 60, 3
+LIKELY = 0.9
+"""Probability from which a plan counts as one that was said to succeed."""
+
+
+def kind_of(bench: dict[str, Any]) -> str:
+    """Kind of a drawn rig; one with a stop and a joint is one with a stop."""
+    options = bench["driver"]["options"]
+    kinds = {KINDS.get(part["kind"], "smooth") for key in ("elements", "friction") for part in options[key]}
+    return next(kind for kind in ("stops", "joints", "smooth") if kind in kinds)
+
+
+def tried(path: Path) -> dict[str, Any]:
+    """Tune a bench, rehearse the plan and run it three times, and once without the feed-forward."""
+    bench, seed = load_bench(path), int(path.stem.split("-")[-1])
+    out: dict[str, Any] = {"rig": path.stem, "words": bench.description.removeprefix("drawn: ")}
+    recording, began = path.with_name(f"{path.stem}-tune.h5"), time.perf_counter()
+    try:
+        tuned = tune(bench, recording, options=RunOptions(seed=seed, overwrite=True))
+    except RigError as error:
+        return out | {"refused": str(error)}
+    plan = tuned.plan
+    path.with_name(f"{path.stem}-plan.toml").write_text(tuned.plan_toml, encoding="utf-8")
+    out |= {
+        "tune_s": time.perf_counter() - began,
+        "distortion": tuned.test.distortion,
+        "tested_v": tuned.test.level_rms_v,
+        "notes": list(tuned.notes),
+        "plan": plan.model_dump(mode="json"),
+        **_truth(bench, tuned.levels.levels_m),
+    }
+    began = time.perf_counter()
+    with Recording(recording) as recorded:
+        known = collect_knowledge(bench, plan, {recording.name: recorded})
+    request = RehearsalRequest(plan=plan, bench=bench, knowledge=known, draws=DRAWS, seed=seed, balanced=False)
+    rehearsal = rehearse(request, until_certain=True, jobs=1)
+    verdict = verdict_of(rehearsal)
+    out |= {
+        "foreseen": verdict.ends_well.value,
+        "foreseen_trip": verdict.trips.value,
+        "draws": [
+            {"unknowns": dict(draw.unknowns), "end": draw.trial.end, "completed": draw.trial.completed}
+            | {"reasons": [f"{point.number} {point.quality}" for point in draw.trial.points if not point.accepted]}
+            for draw in rehearsal.draws
+        ],
+        "rehearsal_s": time.perf_counter() - began,
+    }
+    plain = plan.model_copy(update={"controller": plan.law.model_copy(update={"frequency_feed_forward": False})})
+    out["runs"] = [_run(bench, plan, path, 10**6 + seed + number) for number in range(RUNS)]
+    out["without"] = _run(bench, plain, path, 10**6 + seed)
+    return out
+
+
+def _run(bench: Any, plan: Any, path: Path, seed: int) -> dict[str, Any]:
+    output, began = path.with_name(f"{path.stem}-run.h5"), time.perf_counter()
+    try:
+        run = rig.run(plan, bench=bench, output=output, seed=seed, overwrite=True)
+    except RigError as error:
+        return {"not_run": str(error), "well": False, "tripped": False}
+    with run:
+        part = run.recording.parts[-1]
+        points = [_compared(bench, point) for point in points_of(run.recording)]
+        end = part.end or {"reason": "none", "text": "", "tripped": False}
+        found = {
+            "end": str(end["reason"]),
+            "text": end["text"],
+            "tripped": bool(end["tripped"]),
+            "well": bool(end["completed"]),
+            "ramps_deg": ramp_errors(part, plan.segments(bench.sample_rate_hz)),
+            "points": points,
+            "run_s": time.perf_counter() - began,
+        }
+    output.unlink()
+    return found
+
+
+def ramp_errors(part: Any, segments: Any) -> list[float]:
+    """Largest mean phase error of a period, deg, in each ramp from one point to the next."""
+    segment, theta = part.rows("segment"), part.rows("theta_rad")
+    error = np.degrees(np.nan_to_num(part.rows("phase_error_rad")))
+    starts = np.flatnonzero(np.append(True, np.diff(theta) < -math.pi))
+    mean = np.abs(np.add.reduceat(error, starts) / np.diff(np.append(starts, error.size)))
+    where = segment[starts]
+    ramps = [k for k, each in enumerate(segments) if each.kind == SegmentKind.RAMP and each.point > 0]
+    return [float(mean[where == k].max()) for k in ramps if (where == k).any()]
+
+
+app = typer.Typer(help=__doc__)
+ONE = """
+import json, sys
+from pathlib import Path
+from benchmarks.rehearsed_rigs import tried
+path = Path(sys.argv[1])
+path.with_suffix(".json").write_text(json.dumps(tried(path), default=float), encoding="utf-8")
+"""
+
+
+@app.command()
+def run(folder: Path, seed: int = 1, each: int = 8, timeout_s: float = 1200.0) -> None:
+    """Try rigs of each kind, one after the other, each in a process of its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, kind in _drawn(folder, seed, each):
+        result = path.with_suffix(".json")
+        if result.exists():
+            continue
+        try:
+            done = subprocess.run(
+                [sys.executable, "-c", ONE, str(path)], timeout=timeout_s, capture_output=True, text=True, check=False
+            )
+            failed = done.stderr.strip().splitlines()[-1] if done.returncode else ""
+        except subprocess.TimeoutExpired:
+            failed = f"not ended within {timeout_s:g} s"
+        found = {"rig": path.stem, "failed": failed} if failed else json.loads(result.read_text(encoding="utf-8"))
+        result.write_text(json.dumps(found | {"kind": kind}), encoding="utf-8")
+        print(_line(found | {"kind": kind}), flush=True)
+
+
+def _drawn(folder: Path, seed: int, each: int) -> Iterator[tuple[Path, str]]:
+    """Yield bench files and kinds, the kinds in turn as they are drawn."""
+    wanted = Counter(dict.fromkeys(("stops", "joints", "smooth"), each))
+    while any(wanted.values()):
+        bench = drawn(seed)
+        kind = kind_of(bench)
+        if wanted[kind]:
+            wanted[kind] -= 1
+            path = folder / f"rig-{seed}.toml"
+            path.write_text(tomli_w.dumps(bench), encoding="utf-8")
+            yield path, kind
+        seed += 1
+
+
+def _line(one: dict[str, Any]) -> str:
+    head = f"{one['rig']} {one['kind']:7}"
+    for key in ("failed", "refused"):
+        if key in one:
+            return f"{head} {key}: {one[key][:300]}"
+    well = [run["well"] for run in one["runs"]]
+    happened = "; ".join(sorted({_reason(run) for run in one["runs"]}))
+    return f"{head} foreseen {one['foreseen']:.2f} of {len(one['draws'])}, well {sum(well)} of {len(well)}: {happened[:200]}"
+
+
+def _reason(run: dict[str, Any]) -> str:
+    """Why a run did not end well, in a word or two."""
+    if run["well"]:
+        return "well"
+    if "not_run" in run:
+        return f"refused: {run['not_run'][:80]}"
+    if run["tripped"] or run["end"] != "completed":
+        return f"{run['end']}: {run['text'][:100]}"
+    first = next((point for point in run["points"] if "amplitude_m" not in point), None)
+    return "none" if first is None else f"{first['number'] + 1} {first['quality']}: {first['reason'][:100]}"
+
+
+@app.command()
+def table(folders: list[Path]) -> None:
+    """Show what was foreseen and what happened, by kind."""
+    paths = sorted(path for folder in folders for path in folder.glob("rig-*.json"))
+    found = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+    for one in found:
+        print(_line(one))
+    print("kind | rigs | tuned | said >= 90 % | of those went well | all well | of those said | Brier, of the mean")
+    for kind in ("stops", "joints", "smooth", "all"):
+        print(" | ".join(_row(kind, [one for one in found if kind in (one["kind"], "all")])))
+    tuned = [one for one in found if "runs" in one]
+    print("trips:", sum(run["tripped"] for one in tuned for run in one["runs"]))
+    print(
+        "foreseen, not well:",
+        Counter(_foreseen(draw) for one in tuned for draw in one["draws"] if not draw["completed"]),
+    )
+    print("runs, not well:", Counter(_short(run) for one in tuned for run in one["runs"] if not run["well"]))
+    points = [p for one in tuned for run in one["runs"] for p in run.get("points", []) if "frequency_error" in p]
+    for name in ("frequency_error", "damping_error_true_shape"):
+        sizes = np.abs([point[name] for point in points])
+        if sizes.size:
+            print(
+                f"{name}: median {np.median(sizes):.4%}, 99 % {np.quantile(sizes, 0.99):.3%}, largest {sizes.max():.3%}"
+            )
+    worst = np.array(
+        [
+            [max(run["ramps_deg"], default=math.nan) for run in (one["without"], one["runs"][0])]
+            for one in tuned
+            if one["runs"][0]["well"] and one["without"]["well"]
+        ]
+    )
+    if worst.size:
+        print(
+            "ramps, deg (median, 90 %, largest; without, with):",
+            np.nanquantile(worst, [0.5, 0.9, 1.0], axis=0).round(1).tolist(),
+        )
+
+
+def _row(kind: str, found: list[dict[str, Any]]) -> list[str]:
+    tuned = [one for one in found if "runs" in one]
+    p = np.array([one["foreseen"] for one in tuned for _ in one["runs"]])
+    y = np.array([float(run["well"]) for one in tuned for run in one["runs"]])
+    likely = p >= LIKELY
+    every = [one for one in tuned if all(run["well"] for run in one["runs"])]
+    said = sum(one["foreseen"] >= LIKELY for one in every)
+    if not p.size:
+        return [kind, str(len(found)), "0"]
+    return [
+        *(kind, str(len(found)), str(len(tuned)), str(sum(one["foreseen"] >= LIKELY for one in tuned))),
+        *(f"{int(y[likely].sum())} of {int(likely.sum())} runs", str(len(every)), str(said)),
+        f"{np.mean((p - y) ** 2):.3f}, {y.mean() * (1.0 - y.mean()):.3f}",
+    ]
+
+
+def _foreseen(draw: dict[str, Any]) -> str:
+    if draw["end"] not in ("COMPLETED", "STOPPED"):
+        return str(draw["end"]).lower()
+    return str(draw["reasons"][0].split(" ", 1)[1]) if draw["reasons"] else "none"
+
+
+def _short(run: dict[str, Any]) -> str:
+    if "not_run" in run:
+        return "refused"
+    if run["tripped"] or run["end"] != "completed":
+        return str(run["end"])
+    return next((str(point["quality"]) for point in run["points"] if "amplitude_m" not in point), "none")
+
+
+if __name__ == "__main__":
+    app()
