@@ -19,7 +19,7 @@ from tests.rig.rigs import bench_with
 
 QEMU = "qemu-system-arm"
 BOARD = "boards/mps2-an386"
-FIRST_LEVELS_M = [1.144e-4, 1.678e-4, 2.279e-4, 3.095e-4, 4.173e-4]
+FIRST_LEVELS_M = [1.144e-4, 1.678e-4]
 """The first of the plan's levels: the machine in software runs at a twentieth of the speed of this one."""
 
 
@@ -112,4 +112,4 @@ def test_a_backbone_of_short_points_is_that_of_the_virtual_rig_to_rounding(image
             for field in expected.dtype.names or ():
                 # Fused with the rig or not, a kernel may round the last bit of a number in another way.
                 np.testing.assert_allclose(rows[field], expected[field], rtol=1e-6, err_msg=field)
-        assert arm.n_rows > 10_000
+        assert arm.n_rows > 4_000

@@ -91,23 +91,23 @@ def test_what_cannot_be_told_apart_is_said():
 
 
 @pytest.mark.slow
-def test_width_and_shared_parameters_of_forty_runs_and_bands_of_fresh_ones():
-    experiments, shifts = runs(40)
+def test_width_and_shared_parameters_of_many_runs_and_bands_of_fresh_ones():
+    experiments, shifts = runs(24)
     found, scatter = fit_with_scatter(fitted, experiments)
     width = scatter.widths[scatter.effects.index(FREQUENCY[0])]
     assert width.width == pytest.approx(np.std(shifts, ddof=1), rel=0.02)
-    assert width.width == pytest.approx(WIDTH, rel=0.25)
+    assert width.width == pytest.approx(WIDTH, rel=0.35)
     middle = np.log(found.model.frequency_hz[0] / TRUE.frequency_hz[0])
-    assert abs(middle) < 2.6 * WIDTH / np.sqrt(40.0)
+    assert abs(middle) < 2.6 * WIDTH / np.sqrt(24.0)
     np.testing.assert_allclose(found.model.damping_ratio[0], TRUE.damping_ratio[0], rtol=0.01)
 
-    fresh, _ = runs(40, first=5000)
+    fresh, _ = runs(24, first=5000)
     generator, covered = np.random.default_rng(3), 0
     for one in fresh:
-        band = scatter.band(found.model, one, draws=100)
+        band = scatter.band(found.model, one, draws=60)
         output, sample = generator.integers(3), one.counted_from + generator.integers(one.counted)
         covered += band.low[output, sample] <= one.outputs[output, sample] <= band.high[output, sample]
-    assert binom.cdf(covered, 40, 0.93) > 0.05
+    assert binom.cdf(covered, 24, 0.93) > 0.05
 
 
 def test_shifts_of_a_pnlss_model_come_back():
