@@ -1,10 +1,10 @@
 """Refuses HDF5 files, before any value is read, that link to other files or declare sizes without data."""
 
+import os
+import time
 from collections.abc import Iterator
 from math import ceil, prod
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from rig.errors import RecordingError
 
@@ -24,22 +24,43 @@ _MOST_ATTRIBUTES = 1000  # of an object; chosen: ours have a handful
 _MOST_TEXTS = 2**22  # of a file; chosen
 
 
+_REMEMBERED = 256
+"""Files that have been examined and need not be again. Chosen: some times what a command opens."""
+_SETTLED_S = 0.1
+"""s for which a file must not have changed to be remembered: times of files are whole ticks of the system's clock."""
+_examined: set[tuple[int, ...]] = set()
+
+
+def examine_once(file: "h5py.File") -> None:
+    """Do as `examine`, unless this process has examined the same file since it was changed last."""
+    now_s, found = time.time(), os.fstat(file.id.get_vfd_handle())
+    which = found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+    if which in _examined:
+        return
+    examine(file, found.st_size)
+    if now_s - 1e-9 * max(found.st_mtime_ns, found.st_ctime_ns) > _SETTLED_S:
+        if len(_examined) >= _REMEMBERED:
+            _examined.clear()
+        _examined.add(which)
+
+
 def examine(file: "h5py.File", size: int) -> None:
     """Check every object of an open HDF5 file of ``size`` bytes without reading values.
 
     Raises:
         RecordingError: it names the object, what it holds and what is allowed; without the file's name.
     """
+    import h5py
+
     declared = texts = 0
     for item in objects_in(file):
         check_attributes(item)
-        if hasattr(item, "shape"):
-            dtype = item.dtype  # each look takes time
-            _check_storage(item, dtype)
+        if isinstance(item, h5py.Dataset):
+            dtype, values = item.dtype, _values_in(item)
             if dtype.kind == "O":
-                texts += item.size
+                texts += values
             else:
-                declared += item.size * dtype.itemsize
+                declared += values * dtype.itemsize
     if declared > max(SMALL_BYTES, LARGEST_RATIO * size):
         raise RecordingError(
             f"its datasets declare {declared} bytes in a file of {size}; allowed are {LARGEST_RATIO} times its size"
@@ -61,9 +82,11 @@ def objects_in(file: "h5py.File") -> "Iterator[h5py.Group | h5py.Dataset]":
         group = waiting.pop()
         yield group
         path = group.name.rstrip("/")
-        for name in group:
+        links: dict[str, int] = {}
+        group.id.links.iterate(lambda name, link, found=links: found.update({_text(name): link.type}), info=True)
+        for name, link in links.items():
             where = f"{path}/{name}"
-            if group.id.links.get_info(name.encode("utf-8", "surrogateescape")).type != h5py.h5l.TYPE_HARD:
+            if link != h5py.h5l.TYPE_HARD:
                 raise RecordingError(
                     f"{where} is a link to elsewhere; a file of its own is expected, without soft links"
                 )
@@ -84,35 +107,53 @@ def objects_in(file: "h5py.File") -> "Iterator[h5py.Group | h5py.Dataset]":
 
 def check_attributes(item: "h5py.Group | h5py.Dataset") -> None:
     """Refuse an object with too many or too large attributes by `RecordingError`, before one of them is read."""
+    import h5py
+
+    count = h5py.h5a.get_num_attrs(item.id)
+    if count > _MOST_ATTRIBUTES:
+        raise RecordingError(f"{item.name} has {count} attributes; allowed are {_MOST_ATTRIBUTES}")
+    if count == 0:
+        return
     attributes = item.attrs
-    if len(attributes) > _MOST_ATTRIBUTES:
-        raise RecordingError(f"{item.name} has {len(attributes)} attributes; allowed are {_MOST_ATTRIBUTES}")
     for name in attributes:
         stored = attributes.get_id(name)
         if prod(stored.shape) * stored.dtype.itemsize > _LARGEST_ATTRIBUTE_BYTES:
             raise RecordingError(f"{item.name}: its attribute {name!r} is longer than {_LARGEST_ATTRIBUTE_BYTES} bytes")
 
 
-def _check_storage(dataset: "h5py.Dataset", dtype: np.dtype) -> None:
-    """Refuse values stored in other files or not stored at all, and types other than numbers and texts."""
+def _text(name: bytes) -> str:
+    return name.decode("utf-8", "surrogateescape")
+
+
+def _values_in(dataset: "h5py.Dataset") -> int:
+    """Return how many values a dataset has.
+
+    Refuses those stored in other files or not stored at all, and types other than numbers and texts, by `RecordingError`.
+    """
     import h5py
 
-    if dataset.is_virtual or dataset.external:
+    stored, dtype, shape = dataset.id, dataset.dtype, dataset.shape
+    created = stored.get_create_plist()
+    layout = created.get_layout()
+    if layout == h5py.h5d.VIRTUAL or created.get_external_count():
         raise RecordingError(f"{dataset.name} keeps its values in another file; allowed are values of its own")
-    if dataset.shape is None or dtype.kind not in "biufcSO":
+    if shape is None or dtype.kind not in "biufcSO":
         raise RecordingError("numbers or texts are expected", field=dataset.name, value=dtype)
     if dtype.kind == "O" and h5py.check_string_dtype(dtype) is None:
         raise RecordingError(f"{dataset.name} holds lists or references; numbers or texts are expected")
-    if dataset.size == 0:
-        return
-    if dataset.chunks is None:
-        if dtype.kind != "O" and dataset.id.get_storage_size() < dataset.nbytes:
+    size: int = prod(shape)
+    if size == 0:
+        return 0
+    if layout != h5py.h5d.CHUNKED:
+        if dtype.kind != "O" and stored.get_storage_size() < size * dtype.itemsize:
             raise RecordingError(
-                f"{dataset.name} declares {dataset.nbytes} bytes and stores {dataset.id.get_storage_size()}"
+                f"{dataset.name} declares {size * dtype.itemsize} bytes and stores {stored.get_storage_size()}"
             )
-        return
-    if prod(dataset.chunks) * dtype.itemsize > _LARGEST_CHUNK_BYTES:
-        raise RecordingError(f"{dataset.name} has chunks of {dataset.chunks}; allowed are {_LARGEST_CHUNK_BYTES} bytes")
-    chunks = prod(ceil(length / chunk) for length, chunk in zip(dataset.shape, dataset.chunks, strict=True))
-    if dataset.id.get_num_chunks() != chunks:
-        raise RecordingError(f"{dataset.name} declares {chunks} chunks and stores {dataset.id.get_num_chunks()}")
+        return size
+    chunk = created.get_chunk()
+    if prod(chunk) * dtype.itemsize > _LARGEST_CHUNK_BYTES:
+        raise RecordingError(f"{dataset.name} has chunks of {chunk}; allowed are {_LARGEST_CHUNK_BYTES} bytes")
+    chunks = prod(ceil(length / part) for length, part in zip(shape, chunk, strict=True))
+    if stored.get_num_chunks() != chunks:
+        raise RecordingError(f"{dataset.name} declares {chunks} chunks and stores {stored.get_num_chunks()}")
+    return size

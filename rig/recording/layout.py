@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import RecordingError
-from rig.recording.examination import check_attributes, examine
+from rig.recording.examination import check_attributes, examine_once
 from rig.recording.hdf5_sink import Sink
 from rig.recording.header import FORMAT, SCHEMA, check_schema
 from rig.recording.integrity import append_trailer, integrity_of
@@ -98,7 +98,7 @@ def open_unchecked(path: Path) -> "h5py.File":
             if file.attrs.get("format") != FORMAT:
                 raise RecordingError(f"{path}: not a file of vibrolock, but an HDF5 file of another program")
             check_schema(file.attrs.get("schema"), path)
-            examine(file, path.stat().st_size)
+            examine_once(file)
     except BaseException:
         file.close()
         raise

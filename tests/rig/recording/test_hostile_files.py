@@ -157,6 +157,24 @@ def test_too_many_objects_are_refused(tmp_path, monkeypatch):
         read_arrays(tmp_path / "MODEL.h5")
 
 
+def test_a_file_is_examined_again_once_it_has_changed_and_while_its_times_may_not_tell(tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr(examination, "examine", lambda file, size: seen.append(size))
+    path = tmp_path / "MODEL.h5"
+    write_arrays(path, "nonlinear-mode", {"a": [1.0]}, {})
+    monkeypatch.setattr(examination, "_SETTLED_S", 1e6)
+    for _ in range(2):
+        kind_of(path)
+    assert len(seen) == 2  # just written: a change within a tick of the clock would not be seen
+    monkeypatch.setattr(examination, "_SETTLED_S", -1e6)
+    for _ in range(3):
+        kind_of(path)
+    assert len(seen) == 3
+    write_arrays(path, "nonlinear-mode", {"a": [2.0]}, {})
+    kind_of(path)
+    assert len(seen) == 4
+
+
 def test_attributes_that_are_too_large_are_refused(tmp_path, monkeypatch):
     with new_file(tmp_path / "MODEL.h5", kept="") as (file, _):
         identify(file, "k" * 10)
