@@ -35,11 +35,11 @@ THRESHOLDS = record(
 )
 """Thresholds at which a lock is gained and lost (one record)."""
 
-LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained", f8="slowing")
+LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained side swings", f8="slowing")
 """State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
-``net_out_of_band_periods``: periods out of the band less those in it, at a held level or in a ramp that waits; ``gained``:
-there has been a lock before; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp
-slower."""
+``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``gained``: there has been a lock
+before; ``side``: sign of the last error out of the band, and ``swings``: how often it has changed, in a ramp that waits, since
+the last lock; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower."""
 
 
 class LockRule(Settings):
@@ -52,7 +52,8 @@ class LockRule(Settings):
     lost_deg: float = Field(30.0, gt=0, le=180)
     """Mean phase error of a period above which the period counts as far, deg."""
     lost_periods: int = Field(20, ge=1, le=1000)
-    """Far periods in a row, at a held level, that lose a lock; or three times as many, less the close ones between them."""
+    """Far periods in a row, at a held level, that lose a lock; or three times as many, less the close ones between them; or, in
+    a ramp that waits, as many swings from far on one side to far on the other."""
     waiting_deg: float = Field(30.0, gt=0, le=180)
     """Mean phase error of a period above which an upward ramp of the level waits, once there has been a lock, deg. From half of
     it on the ramp is slower: its rate falls in proportion, to nothing at this error."""
@@ -85,7 +86,8 @@ def next_lock_state(
     ``present``: force and response exceed the smallest amplitudes whose phase can be read.
     ``held``: the level is not being ramped; only then does a large error count towards a lost lock. A phase that swings through
     zero and is far most of the time is lost too, after three times as many periods, for a knock makes it swing as well; also
-    where a ramp has shaken the lock off before, and in one that ``waits`` for the phase.
+    where a ramp has shaken the lock off before. In a ramp that ``waits`` for the phase a lag is no loss, but a phase that has
+    swung from far on one side to far on the other as often as there are periods to lose a lock.
     """
     size = abs(error)
     if not present:
@@ -102,7 +104,11 @@ def next_lock_state(
         lock.state = ACQUIRING
     lock.in_band_periods = lock.in_band_periods + 1 if size < thresholds.locked_rad else 0
     lock.slowing = min(max(2.0 * size / thresholds.waiting_rad - 1.0, 0.0), 1.0)
-    if not (held or waits):
+    if waits and size > thresholds.lost_rad:
+        side = 1 if error > 0.0 else -1
+        lock.swings += 1 if lock.side == -side else 0
+        lock.side = side
+    if not held:
         lock.net_out_of_band_periods = 0
     elif size > thresholds.lost_rad:
         lock.net_out_of_band_periods += 1
@@ -119,8 +125,10 @@ def next_lock_state(
         lock.gained = 1
         lock.out_of_band_periods = 0
         lock.net_out_of_band_periods = 0
+        lock.side = lock.swings = 0
         return
     gone = lock.state == LOCKED and lock.out_of_band_periods >= thresholds.lost_periods
+    gone = gone or lock.swings >= thresholds.lost_periods
     if gone or (lock.gained == 1 and lock.net_out_of_band_periods >= SWINGING * thresholds.lost_periods):
         lock.state = LOST
 
@@ -131,4 +139,5 @@ def reacquire(lock: Record) -> None:
     lock.out_of_band_periods = 0
     lock.in_band_periods = 0
     lock.net_out_of_band_periods = 0
+    lock.side = lock.swings = 0
     lock.state = ACQUIRING

@@ -169,7 +169,7 @@ def test_a_phase_that_swings_in_a_ramp_that_waits_for_it_is_a_lost_lock():
         assert states[-1] is expected
     lagging, _ = _lock()
     _periods(lagging, thresholds, 10, 0.0)
-    assert _periods(lagging, thresholds, 55, 50.0, held=False, waits=True) is LockState.ACQUIRING
+    assert _periods(lagging, thresholds, 500, 50.0, held=False, waits=True) is LockState.ACQUIRING
     assert _periods(lagging, thresholds, 10, 0.0, held=False, waits=True) is LockState.LOCKED
 
 

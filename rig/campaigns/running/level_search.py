@@ -1,4 +1,4 @@
-"""Search for a level at which a multisine stands out of the noise, upwards from a safe voltage.
+"""Search for a level at which a multisine stands out of the noise, upwards from a low voltage, and down where it is too much.
 
 The search is used by a check and by a tuning. All levels are recorded in one file: each further level is a change of the plan.
 """
@@ -18,6 +18,7 @@ from rig.campaigns.running.runner import resume_run, run_plan
 from rig.recording.reader import Recording
 
 FIRST = 1e-3  # of the largest voltage, RMS
+TOO_HIGH = 0.55  # of a limit: peaks of a first level beyond this lower it to the safe share; chosen
 LARGEST_RISE = 4.0  # factor from one level to the next; chosen: 12 dB
 
 
@@ -56,7 +57,10 @@ class Seen:
 
 @dataclass(frozen=True, kw_only=True)
 class LevelSearch:
-    """Raises the level until the responses suffice, peaks come near the limits, or the largest number of levels was tried."""
+    """Raises the level until the responses suffice, peaks come near the limits, or the largest number of levels was tried.
+
+    A level whose peaks are `TOO_HIGH` is lowered, however well its responses stand out: longer records have higher peaks.
+    """
 
     safe_share: float
     """Share of every limit that expected peaks may reach."""
@@ -81,6 +85,8 @@ class LevelSearch:
     def next_level(self, level_rms_v: float, seen: Seen) -> float | None:
         """Return the next level to play; None if this level suffices, or if the limits allow no worthwhile rise."""
         rise = min(seen.wanted_rise, LARGEST_RISE, self.safe_share / seen.share_of_limits)
+        if TOO_HIGH < seen.share_of_limits < math.inf:
+            return level_rms_v * rise
         return level_rms_v * rise if not seen.enough and rise >= self.least_rise else None
 
 

@@ -20,7 +20,7 @@ from rig.tick.sequencer.layout import Drive, OnFailure, Outcome, SegmentKind
 from rig.tick.sequencer.repetition import measure_again, note_result, step_is_over, too_many_faults
 from vibrolock.compiled import Record, kernel
 
-LONGEST_WAIT = 200.0  # periods of a ramp that waits for the phase; a loop that hunts at a level hunts more at the next
+LONGEST_WAIT = 1000.0  # periods of a ramp that waits for the phase, as long as a point may settle; chosen
 LONGEST_WAIT_FOR_HARMONICS = 300.0  # periods beyond its own that the start waits for the harmonics loop; chosen
 RETURN_PERIODS = 20.0  # of the way back to the last level with a lock
 FIRST_PERIODS = 0.01  # of a record, from which on its length in samples is foretold
