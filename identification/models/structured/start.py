@@ -1,6 +1,7 @@
 """Initial values of a structured model: modes from a modal test, and linear regressions for the nonlinear elements."""
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -132,16 +133,18 @@ def periodic_of(experiments: Sequence[Experiment]) -> list[Experiment]:
 
 
 def _root(function: Callable[[float], float], places: Float) -> float:
-    """Return the root nearest to zero between two of the places; without a change of sign the place of the least value."""
+    """Return the root nearest to zero between two of the places; without a change of sign the place of the least value.
+
+    Places are asked from the middle on, and no more than needed.
+    """
     from scipy.optimize import brentq  # only on use: it takes long to load
 
-    values = np.array([function(float(place)) for place in places])
-    crossings = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
-    if not crossings.size:
-        return float(places[np.argmin(np.abs(values))])
-    middles = 0.5 * (places[crossings] + places[crossings + 1])
-    at = crossings[np.argmin(np.abs(middles))]
-    return float(brentq(function, places[at], places[at + 1], rtol=1e-6))
+    value = cache(lambda number: function(float(places[number])))
+    middles = np.abs(places[1:] + places[:-1])
+    for at in np.argsort(middles, kind="stable").tolist():
+        if np.sign(value(at)) != np.sign(value(at + 1)):
+            return float(brentq(function, places[at], places[at + 1], rtol=1e-6))
+    return float(places[min(range(len(places)), key=lambda number: abs(value(number)))])
 
 
 class _Equation:
