@@ -266,6 +266,13 @@ class DAQ(ABC):
         """Images of the held output in the force reading, by resonance; empty where filters keep them out or none are known."""
         return ()
 
+    def image_shares(self, frequency_hz: np.ndarray) -> dict[str, np.ndarray]:
+        """Images of the held output in each channel at float[n] Hz, relative to what it reads of the output, complex[n].
+
+        Of small vibrations, with the filters of the inputs; empty if they are not known. The device need not be open.
+        """
+        return {}
+
     @property
     def latched(self) -> str:
         """Conditions that the device had latched when it was opened, in words (watchdog, emergency stop); empty if none."""

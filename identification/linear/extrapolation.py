@@ -5,7 +5,8 @@ magnet to the best linear approximation grows with the variance of the response.
 the exponent chi of Segalman's density (J. Appl. Mech. 72, 2005), chi in (-1, 0), for the energy lost per cycle. A finite
 number of sliders departs from this law: below some level none slips, and above it properties change steeply. On the friction
 beam the measured exponent was 1.3 for damping and 2.5 for frequency. Unless p is known, every p of a range is taken to be
-equally likely.
+equally likely: the result is the mean of the extrapolations over p, and their variance over p is added. From two levels of the
+ratio r they are ``y_1 + (y_1 - y_2)/(r^p - 1)``, so that most of the range of results belongs to the smallest p.
 """
 
 from collections.abc import Sequence
@@ -22,6 +23,8 @@ _SAME_HZ = 0.03
 """Relative difference of frequencies up to which two modes may be one. Chosen."""
 _SAME_MAC = 0.8
 """MAC above which two modes may be one. Chosen."""
+_EXPONENTS = 12
+"""Number of exponents, at Gauss' points, over which a range is averaged. Chosen."""
 _SPREAD = 1.1
 """Least ratio of successive force levels. Chosen."""
 
@@ -43,8 +46,7 @@ def extrapolated_to_zero(
         Modes of one structure with the same channels, at levels at least 10 % apart.
     exponent
         Power of the force in which properties are linear; 2 for smooth elements. If the lowest and the highest possible power
-        are given, the result is the mean of both extrapolations, and their difference d adds d^2 / 12 to the variance (a
-        range of equally likely values).
+        are given, all between them are equally likely.
     """
     models = sorted((low, high, *further), key=lambda model: model.force_rms_n)
     force = np.array([model.force_rms_n for model in models])
@@ -58,10 +60,13 @@ def extrapolated_to_zero(
     if any(model.channels != models[0].channels for model in models):
         raise IdentificationError("differ between the levels", field="channels")
     kept, values, covariances = _common(models)
-    _, covariance = _intercept(force ** np.mean(powers), values, covariances)
-    ends = [_intercept(force**power, values, covariances)[0] for power in powers]
-    covariance = covariance + np.diag((ends[-1] - ends[0]) ** 2 / 12.0)
-    return _model(models, kept, 0.5 * (ends[0] + ends[-1]), covariance, force, powers)
+    nodes, weights = np.polynomial.legendre.leggauss(_EXPONENTS)
+    likely = np.mean(powers) + 0.5 * (powers[-1] - powers[0]) * nodes
+    found = [_intercept(force**power, values, covariances) for power in likely]
+    ends, share = np.array([one for one, _ in found]), 0.5 * weights
+    mean = share @ ends
+    covariance = np.tensordot(share, [one for _, one in found], 1) + np.diag(share @ (ends - mean) ** 2)
+    return _model(models, kept, mean, covariance, force, powers)
 
 
 def _common(models: Sequence[LinearModes]) -> tuple[list[int], Float, Float]:

@@ -5,8 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.channels import find_role
 from identification.errors import IdentificationError
-from identification.linear.accelerance import WeightedResponses, Weighting, first_weighting, weighted_accelerance
+from identification.linear.accelerance import (
+    WeightedResponses,
+    Weighting,
+    first_weighting,
+    motion_factors,
+    weighted_accelerance,
+)
 from identification.linear.errors_in_variables import DrivenResponses, driven_responses, is_driven, over_force
 from identification.linear.modal_parameters import accepted, as_linear_modes, drive_of, modal_notes
 from identification.linear.model_errors import (
@@ -15,13 +22,15 @@ from identification.linear.model_errors import (
     with_common_distortion,
     with_line_scatter,
     with_model_error,
+    with_repeated_error,
 )
 from identification.linear.modes import LinearModes
 from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.stabilisation import StabilisationDiagram, diagram as stability
 from identification.linear.starts import poles_of, searched, start_of
-from vibrolock.arrays import Float
+from identification.validation import shaped_array
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
 _NEEDED = 2.0
@@ -61,6 +70,7 @@ def linear_modes(
     weighting: Weighting = "auto",
     orders: Sequence[int] | None = None,
     diagram: StabilisationDiagram | None = None,
+    error: Complex | None = None,
 ) -> LinearModes:
     """Identify linear modes from the frequency responses of all motions to a single drive force.
 
@@ -96,6 +106,9 @@ def linear_modes(
         Orders of the stabilisation diagram.
     diagram
         The stabilisation diagram of these responses, if it is known already.
+    error
+        complex[n_lines, n_outputs, n_inputs], error of ``responses.value`` that every record has, such as images of the held
+        output. What it does to the modes is a standard error of each, besides the random one; it is not corrected.
     """
     drive_of(responses.outputs)
     free, scatter = weighting == "auto", weighting == "total" and responses.total_covariance is None
@@ -127,6 +140,9 @@ def linear_modes(
     if is_mostly_distortion(data, _noise(selected, joint, fit, normal=normal), fit):
         fit, data, moved = with_model_error(data, fit, normal=normal, free=free)
         fit, notes = with_common_distortion(fit), notes + moved
+    if error is not None:
+        wrong = _as_accelerance(responses, error, selected, fit, normal=normal)
+        fit = with_repeated_error(data, fit, wrong, normal=normal)
     notes = [*notes, *systematic_misfit(data, fit, normal=normal)]
     result = as_linear_modes(fit, band, data, normal=normal)
     return replace(result, notes=(*band.notes, *notes, *modal_notes(result, data, fit.converged)))
@@ -150,6 +166,27 @@ def _begun(
         start, notes = other
         fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
     return fit, [*notes, *rejected]
+
+
+def _as_accelerance(
+    responses: FrequencyResponseMatrix,
+    error: Complex,
+    selected: FrequencyResponseMatrix,
+    fit: ModalFit,
+    *,
+    normal: bool,
+) -> Complex:
+    """complex[n_lines, n_outputs]: error of what is fitted, from that of ``responses.value``, about the model of ``fit``."""
+    error = shaped_array("error", error, np.complex128, responses.value.shape)
+    lines = np.isin(responses.frequency_hz, selected.frequency_hz)
+    shape = (selected.frequency_hz.size, -1)
+    wrong = error[lines].reshape(shape) * motion_factors(selected)
+    if not is_driven(selected):
+        return wrong
+    force = find_role(selected.outputs, "force")
+    model = modal_basis(selected.s, fit.poles, normal) @ fit.terms.T
+    motions = np.delete(wrong, force, axis=1)
+    return np.asarray((motions - model * wrong[:, [force]]) / selected.value[:, [force], 0])
 
 
 def _noise(

@@ -130,6 +130,17 @@ def with_model_error(
     return replace(chosen, systematic=systematic), responses, notes
 
 
+def with_repeated_error(data: WeightedResponses, fit: ModalFit, error: Complex, *, normal: bool) -> ModalFit:
+    """Return the fit with what an error of the responses, complex[n_lines, n_outputs], does to it as systematic variance.
+
+    The error is the same in every record, so that neighbouring lines share it and their scatter does not show it.
+    """
+    other = fit_modes(replace(data, value=data.value - error[:, :, None]), fit.poles, normal=normal)
+    difference = np.concatenate([other.poles - fit.poles, (other.terms - fit.terms).ravel()])
+    before = 0.0 if fit.systematic is None else fit.systematic
+    return replace(fit, systematic=before + difference**2)
+
+
 def with_common_distortion(fit: ModalFit) -> ModalFit:
     """Return the fit with frequency errors as distortion makes them, whose errors lines have in common.
 

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
         forced_response as forced_response,
         phase_resonance_backbone as phase_resonance_backbone,
     )
-    from simulators.analysis.images import ImageBias as ImageBias, image_bias as image_bias
+    from simulators.analysis.images import (
+        ImageBias as ImageBias,
+        image_bias as image_bias,
+        image_shares as image_shares,
+    )
     from simulators.analysis.responses import (
         HysteresisLoop as HysteresisLoop,
         NotConvergedError as NotConvergedError,

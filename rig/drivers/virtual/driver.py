@@ -196,6 +196,14 @@ class VirtualDAQ(DAQ):
         parts = ((hz, bias.force_n_per_v) for hz, bias in self._image_biases.items())
         return tuple(Image(hz, part.real, part.imag) for hz, part in parts)
 
+    def image_shares(self, frequency_hz: np.ndarray) -> dict[str, np.ndarray]:
+        """Images of the held output in each channel of the linear rig; none behind a reconstruction filter."""
+        if self.rig.converter.reconstruction_hz:
+            return {}
+        from simulators.analysis import image_shares  # no run needs it
+
+        return image_shares(self.rig, frequency_hz)
+
     @property
     def capabilities(self) -> Capabilities:
         """Any block size, not paced, repeatable; safe without the host because it ends with its process."""

@@ -104,3 +104,22 @@ def test_a_covariance_of_rounding_or_of_low_rank_makes_no_false_precision() -> N
     two = linear_modes(driven(7, 0.05, realisations=2), modes=list(FREQUENCY_HZ), orders=range(6, 17, 2))
     assert np.all(two.frequency_std_hz > 1e-7 * FREQUENCY_HZ)
     assert np.all(np.abs(two.frequency_hz - FREQUENCY_HZ) < 5.0 * two.frequency_std_hz)
+
+
+def test_an_error_of_every_record_is_a_standard_error_of_what_it_does_to_the_modes() -> None:
+    clean = driven(0, 1e-4, 1e-4)
+    error = np.zeros(clean.value.shape, np.complex128)
+    error[:, 0, 0] = (2e-3 + 3e-3j) * LINES_HZ / LINES_HZ[-1]  # in the force alone
+    options = {"modes": list(FREQUENCY_HZ), "orders": range(6, 17, 2)}
+    wrong = replace(clean, value=clean.value + error)
+    truth, without = linear_modes(clean, **options), linear_modes(wrong, **options)
+    modes = linear_modes(wrong, **options, error=error)
+    for name in ("frequency", "damping_ratio"):
+        value = "frequency_hz" if name == "frequency" else name
+        std = "frequency_std_hz" if name == "frequency" else "damping_ratio_std"
+        random = getattr(without, std)
+        systematic = np.sqrt(getattr(modes, std) ** 2 - random**2)
+        np.testing.assert_array_equal(getattr(modes, value), getattr(without, value))  # not corrected
+        off = np.abs(getattr(without, value) - getattr(truth, value))
+        assert np.max(off / random) > 3.0
+        assert np.all(np.abs(systematic - off) < 0.05 * off + 0.5 * random)

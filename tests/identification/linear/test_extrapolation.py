@@ -42,9 +42,18 @@ def test_two_levels_carry_their_errors_over() -> None:
 
 
 def test_an_unknown_power_is_in_the_interval() -> None:
-    for power in (1.0, 1.3, 1.7, 2.0, 2.5, 3.0):
+    for power in (1.2, 1.3, 1.7, 2.0, 2.5, 3.0):
         zero = extrapolated_to_zero(at_level(1.0, power), at_level(2.0, power))
         assert np.all(np.abs(zero.damping_ratio - DAMPING) < 1.96 * zero.damping_ratio_std)
+
+
+def test_all_powers_of_a_range_are_equally_likely() -> None:
+    low, high = at_level(1.0, 2.0, 1e-9), at_level(2.0, 2.0, 1e-9)
+    zero, change = extrapolated_to_zero(low, high), low.damping_ratio - high.damping_ratio
+    mean = 0.5 * np.log2((1.0 - 2.0**-3) / (1.0 - 2.0**-1))  # of 1 / (2^p - 1) over p from 1 to 3
+    variance = 0.5 * (1.0 - 1.0 / 7.0) / np.log(2.0) - mean - mean**2
+    np.testing.assert_allclose(zero.damping_ratio, low.damping_ratio + mean * change, rtol=1e-9)
+    np.testing.assert_allclose(zero.damping_ratio_std, np.sqrt(variance) * np.abs(change), rtol=1e-6)
 
 
 def test_levels_that_cannot_be_told_apart_are_refused() -> None:
