@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -137,8 +138,13 @@ def linear_modes(
         fit, data = _most_likely(joint, fit, normal=normal)
     if scatter or (free and data.kind != "total" and fit.misfit > _NEEDED):
         fit, data = with_line_scatter(data, fit, normal=normal)
-    if is_mostly_distortion(data, _noise(selected, joint, fit, normal=normal), fit):
-        fit, data, moved = with_model_error(data, fit, normal=normal, free=free)
+    noise = _weighted_by("noise", selected, fit, normal=normal)
+    total = data if data.kind in ("total", "line scatter") else _weighted_by("total", selected, fit, normal=normal)
+    if total is not None and is_mostly_distortion(total, noise, fit):
+        if total is not data:  # other weights were asked for, the errors are the same
+            data = replace(data, covariance=total.covariance)
+            fit = fit_modes(data, fit.poles, normal=normal)
+        fit, data, moved = with_model_error(data, fit, total, noise, normal=normal, free=free)
         fit, notes = with_common_distortion(fit), notes + moved
     if error is not None:
         wrong = _as_accelerance(responses, error, selected, fit, normal=normal)
@@ -189,15 +195,17 @@ def _as_accelerance(
     return np.asarray((motions - model * wrong[:, [force]]) / selected.value[:, [force], 0])
 
 
-def _noise(
-    responses: FrequencyResponseMatrix, joint: DrivenResponses | None, fit: ModalFit, *, normal: bool
+def _weighted_by(
+    kind: Literal["noise", "total"], responses: FrequencyResponseMatrix, fit: ModalFit, *, normal: bool
 ) -> WeightedResponses | None:
-    if responses.noise_covariance is None:
+    """Return responses with their covariance of a kind, about the model of ``fit`` if they are over a voltage."""
+    if getattr(responses, f"{kind}_covariance") is None:
         return None
-    if joint is None:
-        return None if is_driven(responses) else weighted_accelerance(responses, "noise")
-    alone = driven_responses(responses, "noise")
-    return None if alone is None else alone.around(modal_basis(joint.s, fit.poles, normal) @ fit.terms.T)
+    if not is_driven(responses):
+        found = weighted_accelerance(responses, kind)
+        return None if found.covariance is None else found
+    driven = driven_responses(responses, kind)
+    return None if driven is None else driven.around(modal_basis(driven.s, fit.poles, normal) @ fit.terms.T)
 
 
 def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:

@@ -4,9 +4,7 @@ The best linear approximation of a strongly nonlinear structure is not the respo
 then depends on how lines are weighted. Lines far from the resonance have small errors, so that weights by noise or total
 variance fit them and leave the misfit to the resonance: on a hardening oscillator damping ratios came out 10 to 25 % below
 those that reproduce the resonance. Weights by equal relative errors do not have this preference, but larger random errors.
-
-Both estimates agree within their errors if the model is right: the difference d of an efficient and of a robust estimate has
-the variance ``V_robust - V_efficient`` (Hausman, Econometrica 46, 1978). So ``d^2`` above this variance is model error.
+All of these weights are admissible, so that their largest difference is an error of the model.
 """
 
 from dataclasses import replace
@@ -76,14 +74,14 @@ def systematic_misfit(data: WeightedResponses, fit: ModalFit, *, normal: bool) -
     return notes
 
 
-def is_mostly_distortion(data: WeightedResponses, noise: WeightedResponses | None, fit: ModalFit) -> bool:
-    """Return whether the errors of ``data`` around the modes are known to be far above those of noise alone."""
-    if data.kind == "line scatter":
+def is_mostly_distortion(total: WeightedResponses, noise: WeightedResponses | None, fit: ModalFit) -> bool:
+    """Return whether the ``total`` errors around the modes are known to be far above those of noise alone."""
+    if total.kind == "line scatter":
         return True
-    if data.kind != "total" or noise is None or noise.covariance is None:
+    if noise is None:
         return False
-    near = np.any(_near_modes(data, fit), axis=0)
-    return bool(np.any(near)) and bool(np.median((noise.std**2 / data.std**2)[near]) < _NOISE)
+    near = np.any(_near_modes(total, fit), axis=0)
+    return bool(np.any(near)) and bool(np.median((noise.std**2 / total.std**2)[near]) < _NOISE)
 
 
 def with_line_scatter(data: WeightedResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
@@ -98,36 +96,54 @@ def with_line_scatter(data: WeightedResponses, fit: ModalFit, *, normal: bool) -
 
 
 def with_model_error(
-    data: WeightedResponses, fit: ModalFit, *, normal: bool, free: bool
+    data: WeightedResponses,
+    fit: ModalFit,
+    total: WeightedResponses,
+    noise: WeightedResponses | None,
+    *,
+    normal: bool,
+    free: bool,
 ) -> tuple[ModalFit, WeightedResponses, list[str]]:
-    """Compare ``fit`` with the fit by relative weights where distortion is large; return the fit to rely on, and notes.
+    """Compare ``fit`` with fits by other weights where distortion is large; return the fit to rely on, and notes.
 
-    The squared difference beyond what the random errors allow is added as systematic variance. The fit by relative weights is
-    returned if ``free``, else the one that was asked for.
+    The others are the weights of ``total``, of ``noise`` if known, and relative ones. The largest squared difference between
+    the fit and one of them is added as systematic variance. The fit by relative weights is returned if ``free``, else the one
+    asked for. Where other weights give no such mode, the damping ratio is not identified: its error is as large as itself.
     """
-    if data.covariance is None:
-        return fit, data, []
-    share = data.std[:, :, 0] * fit.misfit / np.maximum(np.abs(data.value[:, :, 0]), 1e-300)
+    share = total.std[:, :, 0] * fit.misfit / np.maximum(np.abs(total.value[:, :, 0]), 1e-300)
     if not any(np.any(near) and np.median(share[near]) > _DISTORTED for near in _near_modes(data, fit)):
         return fit, data, []
-    relative = relative_weights(data)
-    other = fit_modes(relative, fit.poles, normal=normal)
-    if (
-        not other.converged
-        or np.any(np.abs(other.omega / fit.omega - 1.0) > _LARGEST_MOVE)
-        or np.any(other.zeta <= 0.0)
-    ):
-        return fit, data, []
-    difference = np.concatenate([other.poles - fit.poles, (other.terms - fit.terms).ravel()])
-    systematic = np.maximum(difference**2 - np.abs(_variance(other) - _variance(fit)), 0.0)
-    taken = "the latter is used" if free else "the former was asked for"
+    smooth = {"relative": relative_weights(data).smooth, total.kind: total.smooth}
+    smooth |= {} if noise is None else {"noise": noise.smooth}
+    weighted = {name: replace(data, smooth=matrix, kind=name) for name, matrix in smooth.items()} | {data.kind: data}
+    fits = {name: fit_modes(one, fit.poles, normal=normal) for name, one in weighted.items() if one is not data}
+    alike = {data.kind: fit} | {name: other for name, other in fits.items() if _same_modes(other, fit)}
+    taken = "relative" if free and "relative" in alike else data.kind
+    chosen, where = alike[taken], range(fit.omega.size)
+    systematic = np.max([_difference(other, chosen) ** 2 for other in alike.values()], axis=0)
+    ratios = [", ".join(f"{100 * other.zeta[k]:.3g} % by {name}" for name, other in alike.items()) for k in where]
+    lost = ""
+    if len(alike) < len(weighted):
+        systematic[chosen.omega.size : 2 * chosen.omega.size] += chosen.zeta**2
+        others = " and ".join(name for name in fits if name not in alike)
+        lost = f"; weights by {others} give no such mode, and the damping ratio is not identified"
     notes = [
-        f"mode at {f:.5g} Hz: distortion is large at this level, the response is not that of a linear mode; damping ratio "
-        f"{100 * a:.3g} % by weights from {data.kind}, {100 * b:.3g} % by relative weights; {taken}, intervals include both"
-        for f, a, b in zip(other.omega / (2.0 * np.pi), fit.zeta, other.zeta, strict=True)
+        f"mode at {chosen.omega[k] / (2.0 * np.pi):.5g} Hz: distortion is large at this level, the response is not that of a "
+        f"linear mode; its damping ratio depends on the weights: {ratios[k]}; that by {taken} is used, intervals include "
+        f"all{lost}"
+        for k in where
     ]
-    chosen, responses = (other, relative) if free else (fit, data)
-    return replace(chosen, systematic=systematic), responses, notes
+    return replace(chosen, systematic=systematic), weighted[taken], notes
+
+
+def _same_modes(other: ModalFit, fit: ModalFit) -> bool:
+    near = np.abs(other.omega / fit.omega - 1.0) <= _LARGEST_MOVE
+    return other is fit or (other.converged and bool(np.all(near) and np.all(other.zeta > 0.0)))
+
+
+def _difference(other: ModalFit, fit: ModalFit) -> Float:
+    """float[m]: differences of the parameters of two fits."""
+    return np.concatenate([other.poles - fit.poles, (other.terms - fit.terms).ravel()])
 
 
 def with_repeated_error(data: WeightedResponses, fit: ModalFit, error: Complex, *, normal: bool) -> ModalFit:
@@ -136,9 +152,8 @@ def with_repeated_error(data: WeightedResponses, fit: ModalFit, error: Complex, 
     The error is the same in every record, so that neighbouring lines share it and their scatter does not show it.
     """
     other = fit_modes(replace(data, value=data.value - error[:, :, None]), fit.poles, normal=normal)
-    difference = np.concatenate([other.poles - fit.poles, (other.terms - fit.terms).ravel()])
     before = 0.0 if fit.systematic is None else fit.systematic
-    return replace(fit, systematic=before + difference**2)
+    return replace(fit, systematic=before + _difference(other, fit) ** 2)
 
 
 def with_common_distortion(fit: ModalFit) -> ModalFit:
@@ -151,11 +166,6 @@ def with_common_distortion(fit: ModalFit) -> ModalFit:
     scale = np.ones(fit.covariance.shape[0])
     scale[: fit.omega.size] = _COMMON
     return replace(fit, covariance=fit.covariance * np.outer(scale, scale))
-
-
-def _variance(fit: ModalFit) -> Float:
-    """float[m]: random variance of the parameters, with a misfit above 1."""
-    return np.diag(fit.covariance) * fit.misfit**2
 
 
 def _near_modes(data: WeightedResponses, fit: ModalFit) -> NDArray[np.bool_]:

@@ -35,7 +35,13 @@ def test_the_bias_is_what_a_phase_resonance_test_of_the_rig_finds() -> None:
 
 
 def test_shares_behind_a_filter_are_what_is_read_of_the_rig_settled_in_time() -> None:
-    filtered = {"sample_rate_hz": RATE_HZ, "substeps": 8, "oversampling": 4, "anti_alias_hz": 800.0, "anti_alias_order": 2}
+    filtered = {
+        "sample_rate_hz": RATE_HZ,
+        "substeps": 8,
+        "oversampling": 4,
+        "anti_alias_hz": 800.0,
+        "anti_alias_order": 2,
+    }
     rig = one_mode(converter=filtered | {"adc_bits": 0, "dac_bits": 0})
     at_hz = np.array([FREQUENCY_HZ, 600.0])
     shares = image_shares(rig, at_hz)
