@@ -5,9 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from identification import bound_of, frequency_response
-from identification.models.structured import laws
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.laws import Coulomb
+from identification.models.structured.laws import Coulomb, friction
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.structured.models import RATE_HZ, beam, multisine
 
@@ -84,7 +83,7 @@ def test_a_run_is_that_between_turning_points(friction_n, largest):
 def test_what_a_run_does_not_depend_on_is_how_far_a_step_creeps(monkeypatch):
     u, found = multisine(2.0, 3)[:, :1000], []
     for creep in (1e-9, 1e-8, 1e-7):
-        monkeypatch.setattr(laws, "_CREEP", creep)
+        monkeypatch.setattr(friction, "_CREEP", creep)
         found.append(one_mode(0.5, steps=8).simulate(u).displacement)
     for other in found[1:]:
         assert np.linalg.norm(other - found[0]) < 1e-4 * np.linalg.norm(found[0])
