@@ -24,7 +24,7 @@ from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers import make_daq
 from rig.results.linear_modes.identify import identify
 from rig.results.linear_modes.options import LinearOptions
-from simulators.modes import LinearModes as TrueModes
+from simulators.analysis import LinearModes as TrueModes
 
 PLANS = ("magnet-beam/modal", "friction-beam/modal", "own/modal", "open/modal")
 QUANTITIES = ("frequency", "damping", "shape")
@@ -82,7 +82,8 @@ def study(name: str, runs: int) -> dict[str, Any]:
         truth = make_daq(bench).rig.linear_modes
         for seed in range(runs):
             out = Path(folder) / f"{seed}.h5"
-            with rig.run(plan.model_copy(update={"phase_seed": seed}), bench=bench, seed=seed, output=out):
+            own = type(plan).model_validate(plan.model_dump(mode="json") | {"phase_seed": seed})
+            with rig.run(own, bench=bench, seed=seed, output=out):
                 pass
             for hz, outcome in outcomes(identify([out], LinearOptions()).modes, truth).items():
                 everything.setdefault(hz, []).append(outcome)

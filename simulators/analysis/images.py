@@ -72,6 +72,13 @@ def image_shares(rig: VirtualRig, frequencies_hz: ArrayLike) -> dict[str, Comple
     The rig is linear, with elements at their linear stiffness and joints stuck. Not modelled: a reconstruction filter.
 
     Raises `ValueError` if a frequency is not above 0 and below half the sample rate.
+
+    Parameters
+    ----------
+    rig
+        The virtual rig.
+    frequencies_hz
+        Frequencies, float[n], Hz.
     """
     converter, true = rig.converter, frequency_response(rig, frequencies_hz)
     rate_hz, count, step_s = converter.sample_rate_hz, converter.oversampling, 1.0 / converter.internal_rate_hz
