@@ -213,11 +213,8 @@ def told(seed: int, systems: str) -> Iterator[str]:
         ratio, wrong = judged(fit, runs)
         structure = STRUCTURES[name]
         of = [
-            ", ".join(one(level) for level in LEVELS)
-            for one in (
-                lambda level: _multisine_band(fit, structure, level, seed),  # noqa: B023
-                lambda level: _sweep_band(fit, structure, level),  # noqa: B023
-            )
+            ", ".join(_multisine_band(fit, structure, level, seed) for level in LEVELS),
+            ", ".join(_sweep_band(fit, structure, level) for level in LEVELS),
         ]
         said = "yes" if wrong else "no"
         yield f"| {name}, {law} | {100.0 * fit.training_error:.3g} | {ratio:.3g} | {said} | {of[0]} | {of[1]} |"

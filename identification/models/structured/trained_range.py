@@ -24,15 +24,24 @@ class Structure(Protocol):
     """What is asked of a structured model here."""
 
     @property
-    def omega(self) -> Float: ...  # noqa: D102
+    def omega(self) -> Float:
+        """float[n], rad/s."""
+
     @property
-    def damping_ratio(self) -> Float: ...  # noqa: D102
+    def damping_ratio(self) -> Float:
+        """float[n]."""
+
     @property
-    def input_shapes(self) -> Float: ...  # noqa: D102
+    def input_shapes(self) -> Float:
+        """float[n, n_inputs], kg^-1/2."""
+
     @property
-    def elements(self) -> Sequence[NonlinearElement]: ...  # noqa: D102
+    def elements(self) -> Sequence[NonlinearElement]:
+        """The nonlinear elements."""
+
     @property
-    def sample_rate_hz(self) -> float: ...  # noqa: D102
+    def sample_rate_hz(self) -> float:
+        """Samples per second."""
 
 
 class _Secants(NamedTuple):
