@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         SplineSpring as SplineSpring,
         Spring as Spring,
         Stop as Stop,
+        Stribeck as Stribeck,
         UserSpring as UserSpring,
     )
     from identification.models.structured.open_quantities import (

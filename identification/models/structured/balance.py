@@ -17,7 +17,7 @@ from identification.harmonic_balance.basis import Basis, complex_product
 from identification.harmonic_balance.driven import DrivenBalance, Period
 from identification.harmonic_balance.drives import Drive
 from identification.harmonic_balance.stability import by_centroid, distinct
-from identification.models.structured.hysteresis import hysteresis_step
+from identification.models.structured.hysteresis import dry_friction, hysteresis_step
 from identification.models.structured.kernels import damping_at, jenkins_step, spring_at
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.steps import System
@@ -38,10 +38,14 @@ def _is_dry(system: System) -> NDArray[np.bool_]:
 
 
 def _with_soft_friction(system: System, slip: float) -> System:
-    """Return the system with sliders that slip at a displacement in place of dry friction; at infinity without force."""
+    """Return the system with sliders that slip at a displacement in place of dry friction.
+
+    Where it depends on the speed the row of its bend remains.
+    """
     tables, dry = system.tables, _is_dry(system)
     sliders, bends = tables.sliders.copy(), tables.bends.copy()
-    sliders[dry, 0], bends[dry] = sliders[dry, 1] / slip, 0.0
+    sliders[dry, 0] = sliders[dry, 1] / slip
+    bends[dry & (bends[:, 2] == 0.0)] = 0.0
     return system._replace(tables=tables._replace(sliders=sliders, bends=bends))
 
 
@@ -58,7 +62,6 @@ class StructuredBalance(DrivenBalance):
         modes, self.ranges = len(model.omega), len(model.elements)
         super().__init__(model, modes, drive, basis)
         self.model, self.order, self._system = model, 2 * modes, _with_soft_friction(model.system, DRY)
-        self._slipping = _with_soft_friction(self._system, np.inf) if _is_dry(model.system).any() else None
         self.kinks = len(self._system.tables.sliders) > 0
         self._range = np.array([element.largest or element.reach for element in model.elements])
         self._mean_supported = float(support)
@@ -169,10 +172,7 @@ class StructuredBalance(DrivenBalance):
 
     def _at_rest(self, frequency_hz: float) -> Period:
         size = self.basis.size
-        own, self._system = self._system, self._slipping or self._system
-        found = self.along(np.zeros((size, self.n_states)), np.zeros((size, len(self.inputs))), frequency_hz)
-        self._system = own
-        return found
+        return self.along(np.zeros((size, self.n_states)), np.zeros((size, len(self.inputs))), frequency_hz)
 
     def linear_response(self, frequency_hz: float, row: int) -> tuple[Complex, Complex]:
         """Return modal coordinates and outputs of small vibrations."""
@@ -219,13 +219,25 @@ class StructuredBalance(DrivenBalance):
 
 @inner_kernel
 def add_slider(
-    stiffness: float, strength: float, x: np.ndarray, to_time: np.ndarray, force: np.ndarray, by: np.ndarray
+    slider: np.ndarray,
+    sliding: float,
+    scale: float,
+    x: np.ndarray,
+    rate: np.ndarray,
+    to_time: np.ndarray,
+    to_rate: np.ndarray,
+    force: np.ndarray,
+    damping: np.ndarray,
+    by: np.ndarray,
 ) -> None:
     """Add the force of a slider in the second of two periods that begin at rest, and its derivatives.
 
     After one period both extremes of x have passed, and the loop is closed. A slider that sticks has moved from where it last
-    slipped, sample ``slipped``, or from rest (-1), so that its force changes with ``x(k) - x(slipped)``.
+    slipped, sample ``slipped``, or from rest (-1), so that its force changes with ``x(k) - x(slipped)``. That of dry friction
+    that depends on the speed (``sliding``, ``scale``: `dry_friction`) is taken times its size over that at rest; ``damping``
+    gets its derivative by the rate.
     """
+    stiffness, strength = slider[0], slider[1]
     r, last, slipped = 0.0, 0.0, -1
     for repeat in range(2):
         for k in range(x.size):
@@ -233,12 +245,21 @@ def add_slider(
             last = x[k]
             if sticking < 1.0:
                 slipped = k
-            if repeat == 1:
-                force[k] += r
-                if slipped != k:
-                    for c in range(to_time.shape[1]):
-                        begin = to_time[slipped, c] if slipped >= 0 else 0.0
-                        by[k, c] += stiffness * (to_time[k, c] - begin)
+            if repeat == 0:
+                continue
+            share = 1.0
+            if scale > 0.0:
+                size, slope = dry_friction(strength, sliding, scale, abs(rate[k]))
+                share = size / strength
+                steep = r / strength * (slope if rate[k] >= 0.0 else -slope)
+                damping[k] += steep
+                for c in range(to_time.shape[1]):
+                    by[k, c] += steep * to_rate[k, c]
+            force[k] += share * r
+            if slipped != k:
+                for c in range(to_time.shape[1]):
+                    begin = to_time[slipped, c] if slipped >= 0 else 0.0
+                    by[k, c] += share * stiffness * (to_time[k, c] - begin)
 
 
 @inner_kernel
@@ -336,7 +357,20 @@ def along_period(
             for c in range(to_time.shape[1]):
                 by[e, k, c] = slope * to_time[k, c] + damping[e, k] * to_rate[k, c]
         for s in range(tables.first[e], tables.first[e + 1]):
-            if tables.bends[s, 1] == 0.0:
-                add_slider(tables.sliders[s, 0], tables.sliders[s, 1], x[e], to_time, force[e], by[e])
+            bend = tables.bends[s]
+            if bend[1] <= 0.0:
+                scale = bend[2] / system.step_s if bend[1] < 0.0 else 0.0
+                add_slider(
+                    tables.sliders[s],
+                    bend[0],
+                    scale,
+                    x[e],
+                    rate[e],
+                    to_time,
+                    to_rate,
+                    force[e],
+                    damping[e],
+                    by[e],
+                )
             else:
                 add_hysteresis(tables.sliders[s], tables.bends[s], x[e], to_time, rows, force[e], by[e])

@@ -117,10 +117,14 @@ class NonlinearElement:
         found = [law.sliders().T for law in laws if isinstance(law, Joint)]
         return np.concatenate([np.zeros((0, 2)), *found]) * self.scale_m
 
-    def bends(self, laws: Sequence[Law]) -> Float:
-        """float[n_sliders, 3]: yield force (J), exponent and ratio of the same; zeros for a Jenkins slider."""
-        found = [law.bends().T for law in laws if isinstance(law, Joint)]
-        return np.concatenate([np.zeros((0, 3)), *found]) * [self.scale_m, 1.0, 1.0]
+    def bends(self, laws: Sequence[Law], step_s: float = 0.0) -> Float:
+        """float[n_sliders, 3]: yield force (J), exponent and ratio of the same; zeros for a Jenkins slider.
+
+        Speeds of dry friction become ways of a step; without a step it is that at rest.
+        """
+        found = np.concatenate([np.zeros((0, 3)), *(law.bends().T for law in laws if isinstance(law, Joint))])
+        found[found[:, 1] < 0.0, 2] *= step_s
+        return np.asarray(found * [self.scale_m, 1.0, 1.0])
 
 
 class Tables(NamedTuple):
@@ -135,7 +139,8 @@ class Tables(NamedTuple):
     sliders: np.ndarray
     """float[n_sliders, 2]: stiffness and largest force."""
     bends: np.ndarray
-    """float[n_sliders, 3]: yield force, exponent and ratio of a hysteresis; zeros for Jenkins, exponent -1 for dry friction."""
+    """float[n_sliders, 3]: yield force, exponent and ratio of a hysteresis; zeros for Jenkins, an exponent of -1 between
+    sliding force and way of a step at Stribeck's speed for dry friction."""
     first: np.ndarray
     """int[n_elements + 1]: first slider of every element."""
     bent: np.ndarray
@@ -163,8 +168,11 @@ class DerivativeTables(NamedTuple):
     """int[P_joints]: end of the sliders that it changes."""
 
 
-def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Float) -> Tables:
-    """Return the tables; ``softest`` and ``stiffest``, float[n_elements], limit the slopes (J) beyond the reach."""
+def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Float, step_s: float) -> Tables:
+    """Return the tables for steps of ``step_s``.
+
+    ``softest`` and ``stiffest``, float[n_elements], limit the slopes (J) beyond the reach.
+    """
     springs = np.array([element.spring(element.laws) for element in elements]).reshape(-1, 3, NODES)
     sliders = [element.sliders(element.laws) for element in elements]
     limits = [
@@ -176,7 +184,7 @@ def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Fl
         dampers=np.array([element.damper(element.laws) for element in elements]).reshape(-1, NODES),
         limits=np.array(limits).reshape(-1, 3),
         sliders=np.concatenate([np.zeros((0, 2)), *sliders]),
-        bends=np.concatenate([np.zeros((0, 3)), *(element.bends(element.laws) for element in elements)]),
+        bends=np.concatenate([np.zeros((0, 3)), *(element.bends(element.laws, step_s) for element in elements)]),
         first=np.cumsum([0, *map(len, sliders)]),
         bent=np.array([bool(np.any(element.bends(element.laws))) for element in elements], dtype=np.bool_),
     )
@@ -197,7 +205,7 @@ def laws_in_order(elements: Sequence[NonlinearElement]) -> list[tuple[int, int]]
     ]
 
 
-def derivative_tables_of(elements: Sequence[NonlinearElement], tables: Tables) -> DerivativeTables:
+def derivative_tables_of(elements: Sequence[NonlinearElement], tables: Tables, step_s: float) -> DerivativeTables:
     """Return the derivatives of `tables_of` by the numbers of the laws."""
     owner, springs, limits, dampers, joints = [], [], [], [], []
     for e, number in laws_in_order(elements):
@@ -218,7 +226,7 @@ def derivative_tables_of(elements: Sequence[NonlinearElement], tables: Tables) -
                 )  # linear; less may be below zero
             else:
                 way = float(more.vector[k] - less.vector[k])  # less may be at its bound
-                rows = [np.hstack([element.sliders([one]), element.bends([one])]) for one in (more, less)]
+                rows = [np.hstack([element.sliders([one]), element.bends([one], step_s)]) for one in (more, less)]
                 change = np.zeros((len(tables.sliders), 5))
                 change[begin : begin + len(rows[0])] = (rows[0] - rows[1]) / way
                 joints.append(change)

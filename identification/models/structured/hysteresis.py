@@ -12,9 +12,11 @@ a step belongs to the change of the state. ``g`` is larger below zero (unloading
 that the work is never less than the rise of the energy ``integral of r dr/(k g(-|r|/y))`` that unloading gives back.
 
 Dry friction has no memory. Over a step it is ``k`` times the way, at most the largest force, with a k so large that a step that
-holds hardly moves; the work is never negative.
+holds hardly moves; the work is never negative. By Stribeck's law it falls from the largest force at rest with the way of a
+step, that is with the speed, as ``y + (largest - y) exp(-(way/gamma)^2)``, with the way gamma of a step at Stribeck's speed.
 
-A row of `Tables.bends` is ``[y, n, gamma]``; n is 0 for a Jenkins slider and below zero for dry friction.
+A row of `Tables.bends` is ``[y, n, gamma]``; n is 0 for a Jenkins slider and below zero for dry friction, with gamma 0 where it
+does not depend on the speed.
 """
 
 import math
@@ -91,6 +93,16 @@ def along(w: float, largest: float, n: float, gamma: float, way: float) -> tuple
 
 
 @kernel
+def dry_friction(at_rest: float, sliding: float, scale: float, speed: float) -> tuple[float, float]:
+    """Return the size of dry friction at a speed, at least 0, and its derivative by it; ``scale`` 0: that at rest."""
+    if scale == 0.0:
+        return at_rest, 0.0
+    share = speed / scale
+    more = (at_rest - sliding) * math.exp(-share * share)
+    return sliding + more, -2.0 * share / scale * more
+
+
+@kernel
 def hysteresis_step(
     r: float, k: float, largest: float, y: float, n: float, gamma: float, way: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -100,8 +112,8 @@ def hysteresis_step(
     from the equation, which knows x by its differential only: ``d w/d w0 = g(w)/g(w0)``.
     """
     if n < 0.0:
-        held = abs(k * way) < largest
-        dry, by = (k * way, k) if held else (math.copysign(largest, way), 0.0)
+        size, by = dry_friction(largest, y, gamma, abs(way))
+        dry, by = (k * way, k) if abs(k * way) < size else (math.copysign(size, way), by)
         return dry, dry, by, 0.0, by, 0.0
     sign = math.copysign(1.0, way)
     most = largest / y

@@ -184,7 +184,7 @@ class StructuredModel(Result):
             b=np.array(self.input_shapes),
             inputs=len(self.inputs),
             phi=phi,
-            tables=tables_of(self.elements, _SOFTEST * static, _STIFFEST * static),
+            tables=tables_of(self.elements, _SOFTEST * static, _STIFFEST * static, self.step_s),
             support=np.array(
                 [self.support_n_m, 2.0 * np.pi * self.support_corner_hz, self.support_largest_n],
             ),

@@ -173,7 +173,7 @@ class Parameters:
         """Return the counted outputs, float[n, n_outputs], and their derivatives by the vector, float[n, n_outputs, P]."""
         system, modes, inputs = model.system, len(model.frequency_hz), len(model.inputs)
         stretches, ends = _stretches(model, u, nudging)
-        changes = derivative_tables_of(model.elements, system.tables)
+        changes = derivative_tables_of(model.elements, system.tables, system.step_s)
         count = 2 * modes + modes * inputs + system.phi.size + changes.element.size + 1
         count += -count % _VECTOR  # columns of zeros before the last
         states = np.zeros((u.shape[1], 3, modes))

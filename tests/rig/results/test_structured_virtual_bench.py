@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, backbone
-from identification.models import BoucWen, Coulomb, Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
+from identification.models import (
+    BoucWen,
+    Coulomb,
+    Jenkins,
+    Masing,
+    PolynomialDamper,
+    PolynomialSpring,
+    Stribeck,
+    UserSpring,
+)
 from rig.authoring.new_files import new_file
 from rig.bench import load_bench
 from rig.bench.cross_checks import cautions
@@ -193,7 +202,7 @@ def test_a_spring_that_pushes_at_rest_is_refused():
         structured_bench(beam(elements=(element,)), load_bench("magnet-beam"))
 
 
-@pytest.mark.parametrize("law", [BoucWen(), Coulomb()])
+@pytest.mark.parametrize("law", [BoucWen(), Coulomb(), Stribeck()])
 def test_a_joint_that_no_virtual_rig_has_is_refused(law):
     element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(law,))
     with refused(IdentificationError, "element-has-a-joint-of-no-rig"):

@@ -1,7 +1,7 @@
 """Laws of nonlinear elements: springs, dampers, and joints with memory, each one declaration (`laws.law`)."""
 
 from identification.models.structured.laws.dampers import Damper as Damper, PolynomialDamper as PolynomialDamper
-from identification.models.structured.laws.friction import Coulomb as Coulomb
+from identification.models.structured.laws.friction import Coulomb as Coulomb, Stribeck as Stribeck
 from identification.models.structured.laws.joints import (
     BoucWen as BoucWen,
     Iwan as Iwan,
@@ -39,6 +39,7 @@ LAWS: dict[str, type[Law]] = {
         Masing,
         BoucWen,
         Coulomb,
+        Stribeck,
     )
 }
 """All laws by their names."""

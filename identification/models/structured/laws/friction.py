@@ -1,4 +1,4 @@
-"""Dry friction."""
+"""Dry friction, the same at all speeds or larger at rest."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -39,3 +39,33 @@ class Coulomb(Joint):
     def bends(self) -> Float:
         """float[3, 1]: an exponent of -1 for dry friction."""
         return np.array([[0.0], [-1.0], [0.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Stribeck(Joint):
+    """Dry friction that is larger at rest: ``R (1 + rise exp(-(w/speed_per_s)^2))`` at the speed w, by Stribeck's law.
+
+    Otherwise as `Coulomb`. It is passive whatever its numbers are. The form is that of Bo and Pavelescu (Wear 82, 1982, 277)
+    with the exponent 2. Regressions, which know displacements alone, and the range use take the friction at rest.
+    """
+
+    kind = "stribeck"
+    free: ClassVar = {"friction_n": POSITIVE, "rise": POSITIVE, "speed_per_s": POSITIVE}
+    linear = "friction_n"
+    sticks = False
+
+    friction_n: float = 1.0
+    """Friction force far above Stribeck's speed, N."""
+    rise: float = 0.5
+    """What it is more at rest, over that."""
+    speed_per_s: float = 20.0
+    """Stribeck's speed, x per s."""
+
+    def sliders(self) -> Float:
+        """float[2, 1]: stiffness and largest force."""
+        at_rest = self.friction_n * (1.0 + self.rise)
+        return np.array([[at_rest / _CREEP], [at_rest]])
+
+    def bends(self) -> Float:
+        """float[3, 1]: sliding force, an exponent of -1 for dry friction, and Stribeck's speed."""
+        return np.array([[self.friction_n], [-1.0], [self.speed_per_s]])

@@ -45,7 +45,7 @@ class Joint(Law):
     def bends(self) -> Float:
         """float[3, n]: yield force (N), exponent and ratio gamma of each hysteresis (`hysteresis`).
 
-        Zeros for a slider; an exponent of -1 for dry friction.
+        Zeros for a slider; sliding force (N), -1 and Stribeck's speed (x per s; 0 for none) for dry friction.
         """
         return np.zeros((3, self.sliders().shape[1]))
 

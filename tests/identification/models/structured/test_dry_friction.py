@@ -3,38 +3,46 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from identification import bound_of, frequency_response
 from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.laws import Coulomb, friction
+from identification.models.structured.laws import Coulomb, Stribeck, friction
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.structured.models import RATE_HZ, beam, multisine
 
 OMEGA, ZETA = 50.0 * np.pi, 0.01
 
 
-def one_mode(friction_n, **changes):
-    """One mode of 25 Hz and mass 1 kg on which dry friction acts."""
+def one_mode(friction, **changes):
+    """One mode of 25 Hz and mass 1 kg on which dry friction acts: a law, or the force of Coulomb's."""
     numbers = {
         "frequency_hz": [25.0],
         "damping_ratio": [ZETA],
         "input_shapes": [[1.0]],
         "output_shapes": [[1.0], [1.0], [1.0]],
         "direct": np.zeros((3, 1)),
-        "elements": (NonlinearElement(direction=[1.0], scale_m=1e-3, laws=(Coulomb(friction_n),)),),
+        "elements": (
+            NonlinearElement(
+                direction=[1.0], scale_m=1e-3, laws=(Coulomb(friction) if isinstance(friction, float) else friction,)
+            ),
+        ),
         "support_n_m": 0.0,
     }
     return beam(**(numbers | changes))
 
 
-def by_events(friction_n, force, times):
-    """Displacement of a sliding mass, integrated from one turning point to the next; it sticks while the force is too small."""
+def by_events(friction, force, times):
+    """Displacement of a sliding mass, integrated from one turning point to the next; it sticks while the force is too small.
+
+    ``friction``: its size (N) at a speed (m/s), at least 0.
+    """
     state, at, found = np.zeros(2), 0.0, np.zeros(times.size)
     while at < times[-1]:
         pull = force(at) - OMEGA**2 * state[0]
-        if abs(pull) <= friction_n:
+        if abs(pull) <= friction(0.0):
             grid = np.linspace(at, min(at + 0.01, times[-1]), 2001)
-            free = np.flatnonzero(np.abs(force(grid) - OMEGA**2 * state[0]) > friction_n)
+            free = np.flatnonzero(np.abs(force(grid) - OMEGA**2 * state[0]) > friction(0.0))
             end = grid[free[0]] if free.size else grid[-1]
             found[(times > at) & (times <= end)] = state[0]
             at, state = end, np.array([state[0], 0.0])
@@ -48,7 +56,7 @@ def by_events(friction_n, force, times):
         part = solve_ivp(
             lambda t, y, sign=sign: [
                 y[1],
-                force(t) - 2.0 * ZETA * OMEGA * y[1] - OMEGA**2 * y[0] - sign * friction_n,
+                force(t) - 2.0 * ZETA * OMEGA * y[1] - OMEGA**2 * y[0] - sign * friction(abs(y[1])),
             ],
             (at, times[-1]),
             state,
@@ -64,16 +72,29 @@ def by_events(friction_n, force, times):
     return found
 
 
-@pytest.mark.parametrize(("friction_n", "largest"), [(0.3, 2e-3), (1.5, 1e-2)])
-def test_a_run_is_that_between_turning_points(friction_n, largest):
+def stribeck(law, scale_m=1e-3):
+    """Its size in N at a speed in m/s, by the formula."""
+    return lambda w: law.friction_n * (1.0 + law.rise * np.exp(-((w / (law.speed_per_s * scale_m)) ** 2)))
+
+
+LAWS = {
+    "light": (Coulomb(0.3), lambda w: 0.3, 2e-3),
+    "heavy": (Coulomb(1.5), lambda w: 1.5, 1e-2),
+    "stribeck": (Stribeck(0.4, 0.8, 40.0), stribeck(Stribeck(0.4, 0.8, 40.0)), 5e-3),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_run_is_that_between_turning_points(name):
+    law, size, largest = LAWS[name]
     times = np.arange(400) / RATE_HZ
 
     def force(t):
         return 2.0 * np.sin(2.0 * np.pi * 20.0 * np.asarray(t)) + np.sin(2.0 * np.pi * 30.0 * np.asarray(t))
 
-    exact, errors = by_events(friction_n, force, times), []
+    exact, errors = by_events(size, force, times), []
     for steps in (2, 8):
-        found = one_mode(friction_n, steps=steps).simulate(force(times)[None])
+        found = one_mode(law, steps=steps).simulate(force(times)[None])
         assert found.unsolved_steps == 0
         errors.append(np.linalg.norm(found.displacement[0] - exact) / np.linalg.norm(exact))
     assert errors[1] < largest
@@ -96,8 +117,23 @@ def test_the_peak_of_a_response_is_that_of_the_closed_form():
     assert peak.amplitude_m == pytest.approx((2.0 - 4.0 * 0.5 / np.pi) / (2.0 * ZETA * OMEGA**2), rel=1e-3)
 
 
-def test_derivatives_are_those_of_finite_differences():
-    start = one_mode(0.3, steps=2)
+def test_the_peak_of_a_response_with_stribeck_friction_balances_the_power():
+    """At resonance the force feeds damper and friction: ``F a/2 = c w a^2/2 + mean of R(w) |w|`` of the sine."""
+    law = Stribeck(0.3, 1.0, 150.0)
+    peak = frequency_response(one_mode(law), 2.0, band_hz=(22.0, 28.0), largest_range_use=9.0).peak()
+    speed = np.abs(np.cos(np.linspace(0.0, 2.0 * np.pi, 4096, endpoint=False)))
+
+    def missing(a):
+        w = OMEGA * a * speed
+        return 0.5 * 2.0 * OMEGA * a - 0.5 * 2.0 * ZETA * OMEGA * (OMEGA * a) ** 2 - np.mean(stribeck(law)(w) * w)
+
+    assert peak.amplitude_m == pytest.approx(brentq(missing, 1e-3, 1e-2), rel=2e-3)
+    assert peak.frequency_hz == pytest.approx(25.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("law", [Coulomb(0.3), Stribeck(0.2, 0.5, 40.0)])
+def test_derivatives_are_those_of_finite_differences(law):
+    start = one_mode(law, steps=2)
     parameters = Parameters(start, (0,), False)
     vector, u = parameters.vector(start), multisine(2.0, 4)[:, :200]
     _, exact = parameters.derivatives(start, u, 20)
