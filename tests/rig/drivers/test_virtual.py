@@ -79,6 +79,15 @@ def test_images_of_every_linear_mode_are_known_without_filters_alone() -> None:
     assert [image.frequency_hz for image in images] == pytest.approx([24.37, 134.06, 380.94], abs=0.01)
 
 
+def test_shares_of_images_are_those_of_the_rig_with_its_filters_and_none_behind_a_filter_of_the_output() -> None:
+    at_hz = np.array([24.0, 300.0])
+    open_, filtered = (make_daq(slow_bench(**one)).image_shares(at_hz) for one in ({"substeps": 20}, SLOW_AND_FILTERED))
+    for name in ("force", "drive"):
+        assert np.all(np.abs(filtered[name]) < 0.1 * np.abs(open_[name]))
+    smooth = SLOW_AND_FILTERED | {"anti_alias_hz": 0.0, "reconstruction_hz": 320.0}
+    assert make_daq(slow_bench(**smooth)).image_shares(at_hz) == {}
+
+
 def test_slow_bench_without_filters_and_with_little_bias_still_says_that_the_output_aliases(monkeypatch) -> None:
     monkeypatch.setattr("rig.drivers.virtual.images.TOLERANCE", 1.0)
     (remark,) = make_daq(slow_bench(substeps=20)).remarks

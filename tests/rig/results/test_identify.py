@@ -8,8 +8,11 @@ import pytest
 import rig
 from identification.exciter_coupling import PARAMETERS
 from rig.campaigns.plans import load_plan, plan_from
+from rig.drivers.virtual.driver import VirtualDAQ
 from rig.recording.reader import Recording
 from rig.results.files import load
+from rig.results.linear_modes.identify import identify
+from rig.results.linear_modes.options import LinearOptions
 from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
 from tests.recorded import recorded_at
@@ -63,6 +66,17 @@ def test_a_known_resistance_and_stinger_make_the_moving_mass_surer(command, shel
     ):
         assert told[name]["value"] == pytest.approx(value, rel=5e-3)
         assert abs(told[name]["value"] - value) < 4.0 * told[name]["std"]
+
+
+def test_a_modal_fit_asks_the_driver_of_the_recorded_bench_for_images_of_the_output(shelf, monkeypatch):
+    path, without = shelf / "modal.h5", load(shelf / "LIN.h5").modes
+    monkeypatch.setattr(VirtualDAQ, "image_shares", lambda self, hz: {"force": np.full(hz.size, 2e-3)})
+    modes = identify([path], LinearOptions(count=2)).modes  # a force that reads 0.2 % too much
+    np.testing.assert_array_equal(modes.frequency_hz, without.frequency_hz)
+    systematic = np.sqrt(modes.shapes_std[0] ** 2 - without.shapes_std[0] ** 2)
+    np.testing.assert_allclose(systematic, 1e-3 * np.abs(without.shapes[0]), rtol=0.1)  # its square goes with the force
+    monkeypatch.setattr(VirtualDAQ, "image_shares", lambda self, hz: {})
+    np.testing.assert_array_less(identify([path], LinearOptions(count=2)).modes.shapes_std, 1.0001 * without.shapes_std)
 
 
 @pytest.mark.parametrize(
