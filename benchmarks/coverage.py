@@ -1,6 +1,6 @@
 """Do stated 95 % intervals hold the truth? Backbones of virtual rigs, seed after seed, and what their intervals cover.
 
-    python -m benchmarks.coverage [PLAN ...] [--seeds 18] [--noise 1 --noise 10] [--levels] [--output FILE]
+    python -m benchmarks.coverage [PLAN ...] [--seeds 18] [--noise 1 --noise 10] [--spread 0] [--levels] [--output FILE]
 
 Every recording is replayed: the recorded output, through the same rig without sensors and with finer steps, gives the true
 force and the true motion of the drive point during every point. The truth of force and amplitude are the
@@ -11,6 +11,9 @@ The random part of an interval is compared with the scatter of the errors about 
 The whole interval shall cover the truth. ``--noise 10`` is ten times the noise of all sensors and ten times the steps of
 their converter. ``own`` is the rig of docs/tutorials/a-rig-of-your-own.md; further plans on it and on a drawn one are those of
 `benchmarks.coverage_rigs`.
+
+Steps of the converters are the same in every run with the same levels, so that all runs together are one draw of them.
+``--spread 0.05`` gives each run levels of its own, within 5 % of those of the plan.
 
 Held displacements are judged by their points at phase resonance. Points that are not settled (short ones, those of a continuous
 backbone) have no force and amplitude of their own: truth is that of phase resonance at the amplitude that they are given.
@@ -267,7 +270,16 @@ def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:
     }
 
 
-def study(name: str, seeds: Sequence[int], factor: float, at: str = "amplitude") -> dict[str, Any]:
+def with_own_levels(plan: Plan, seed: int, spread: float) -> Plan:
+    """Return a plan with levels that differ from its own by up to ``spread``, relative, as the seed has it."""
+    random, table = np.random.default_rng([seed, 7]), plan.model_dump(mode="json")
+    for key in ("levels_v", "levels_n", "levels_m"):
+        if table.get(key):
+            table[key] = [level * (1.0 + spread * random.uniform(-1.0, 1.0)) for level in table[key]]
+    return type(plan).model_validate(table)
+
+
+def study(name: str, seeds: Sequence[int], factor: float, at: str = "amplitude", spread: float = 0.0) -> dict[str, Any]:
     """Run a plan with every seed and return the summary of every quantity."""
     with tempfile.TemporaryDirectory() as folder:
         path = plan_of(name, Path(folder))
@@ -276,7 +288,8 @@ def study(name: str, seeds: Sequence[int], factor: float, at: str = "amplitude")
             raise ValueError(f"{name}: is a {plan.kind}, allowed is one of {', '.join(KINDS)}")
         bench = noisier(bench_of(plan, path), factor)
         exact = make_daq(bench).rig
-        points = [point for seed in seeds for point in run_once(plan, bench, exact, seed, at)]
+        plans = {seed: with_own_levels(plan, seed, spread) if spread else plan for seed in seeds}
+        points = [point for seed in seeds for point in run_once(plans[seed], bench, exact, seed, at)]
     add_modal_truth(exact, points, at)
     planned = len(plan.levels if plan.kind == "response-controlled" else plan.targets()) * len(seeds)
     quantities = QUANTITIES if settled(plan) else UNSETTLED
@@ -288,6 +301,7 @@ def main(
     seeds: int = 18,
     first_seed: int = 0,
     noise: list[float] | None = None,
+    spread: float = 0.0,
     at: Literal["amplitude", "force"] = "amplitude",
     levels: bool = False,
     output: Path | None = None,
@@ -296,7 +310,7 @@ def main(
     everything: dict[str, Any] = {}
     for name in plans or PLANS:
         for factor in noise or (1.0, 10.0):
-            found = study(name, range(first_seed, first_seed + seeds), factor, at)
+            found = study(name, range(first_seed, first_seed + seeds), factor, at, spread)
             everything[f"{name}, noise {factor:g}"] = found
             left_out = () if levels else ("levels",)
             shown = {
