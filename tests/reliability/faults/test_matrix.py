@@ -34,6 +34,18 @@ def test_the_matrix_has_faults_of_every_part_at_every_kind_of_level_on_both_devi
     }
 
 
+@pytest.mark.parametrize("part", ["force", "drive", "response", "amplifier", "structure", "driver"])
+def test_the_tests_look_at_every_kind_of_fault_in_volts_and_newtons_and_at_every_onset_with_both(part):
+    here = [case for case in TESTED if case.fault.part == part and case.device == "virtual"]
+    loops = {case: case.levels.replace(",", " ").split()[0] for case in here}
+    onsets = {(case.fault.onset, loops[case]) for case in here}
+    assert {loop for _, loop in onsets} >= {"V", "N"}
+    if part in ("force", "drive", "response"):
+        assert onsets >= {(onset, loop) for onset in ("start", "middle") for loop in ("V", "N")}
+        for kind in {case.fault.kind for case in here if case.fault.onset == "start"}:
+            assert {loops[case] for case in here if case.fault.kind == kind} >= {"V", "N"}
+
+
 def test_each_bound_can_be_broken():
     case = next(case for case in CASES if case.name == "force-nan-middle, N logarithmic, virtual")
     seen, bench = observe(*case), bench_for(case.levels)
