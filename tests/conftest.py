@@ -14,6 +14,7 @@ import pytest
 from hypothesis import settings
 from joblib.externals.loky import reusable_executor
 
+from tests import forking
 from tests.running import in_order, keep_bytecode, use_memory_for_files, workers
 from tests.sharing import shared_folder
 from tests.studies.installed import install_studies
@@ -22,6 +23,7 @@ keep_bytecode()
 use_memory_for_files()
 shared_folder()  # before workers are started, which then share it
 install_studies()
+forking.install()
 
 pytest_plugins = ["tests.changed.plugin", "tests.command", "tests.browsing"]
 

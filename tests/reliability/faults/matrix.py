@@ -37,7 +37,9 @@ class Case(NamedTuple):
             return not (middle and turn % 2 and fault.part in ("force", *BEHIND_THE_OUTPUT))
         if fault.part in ("drive", *BEHIND_THE_OUTPUT):  # what every loop has to do with
             return middle == (self.levels == ("V", "N logarithmic", "m")[turn % 3])
-        return self.levels != ("V", "N logarithmic")[(turn + middle) % 2]  # the loop of displacements is as that of volts
+        return (
+            self.levels != ("V", "N logarithmic")[(turn + middle) % 2]
+        )  # the loop of displacements is as that of volts
 
 
 EMULATED = "N logarithmic"

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from rig.errors import RigError
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
+from tests.forking import FORKED
 
 ROOT = Path(__file__).parents[3]
 PLAN = """
@@ -45,7 +46,7 @@ def write_plan(folder: Path) -> Path:
 
 def command(*arguments: str | Path, before: str = "") -> list[str]:
     """The command line of ``rig``, with some Python done ``before`` it."""
-    return [sys.executable, "-c", f"{before}\n{_MAIN}", *map(str, arguments)]
+    return [sys.executable, "-c", f"{FORKED}{before}\n{_MAIN}", *map(str, arguments)]
 
 
 def run_command(*arguments: str | Path, before: str = "", cwd: Path | None = None, **environment: str) -> Ended:

@@ -13,7 +13,8 @@ from tests.reliability.places.running import Ended, command, objections, run_com
 from tests.waiting import wait_until
 
 _LIMITED = """
-import resource, signal
+import resource, signal, sys
+sys.dont_write_bytecode = True  # which a full disk cuts short
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, resource.RLIM_INFINITY))
 """

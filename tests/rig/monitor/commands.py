@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from tests.forking import FORKED
 from tests.waiting import LONG_S
 
 CODE = (
@@ -17,7 +18,11 @@ CODE = (
 def started(*words: str, **options: object) -> "subprocess.Popen[str]":
     """A process with its output to be read."""
     return subprocess.Popen(
-        [sys.executable, "-c", CODE, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+        [sys.executable, "-c", FORKED + CODE, *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
     )  # type: ignore[call-overload]
 
 

@@ -16,6 +16,7 @@ from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.journal_contents import JournalContents
 from rig.recording.reader import Recording
+from tests.forking import FORKED
 from tests.refused import refused
 from tests.rig.recording.samples import ROW, all_rows, fill, header, journal, rows
 
@@ -59,6 +60,7 @@ def test_no_row_whose_write_returned_is_lost_by_killing_the_writer_again_and_aga
 
 FULL_DISK = """
 import resource, signal, sys
+sys.dont_write_bytecode = True  # which a full disk cuts short
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 from rig.errors import RecordingError
 def limit(n): resource.setrlimit(resource.RLIMIT_FSIZE, (n, resource.RLIM_INFINITY))
@@ -68,7 +70,7 @@ def lift(): resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, r
 
 def run(code, *arguments):
     done = subprocess.run(
-        [sys.executable, "-c", FULL_DISK + code, *map(str, arguments)],
+        [sys.executable, "-c", FORKED + FULL_DISK + code, *map(str, arguments)],
         capture_output=True,
         text=True,
         cwd=ROOT,

@@ -25,6 +25,7 @@ from rig.recording.journal_blocks import JournalBlocks
 from rig.recording.reader import Recording
 from rig.show.summary import summarise
 from rig.tick.sequencer.segments import SettleRule
+from tests.forking import FORKED
 from tests.recorded import recorded_at
 from tests.refused import refused
 from tests.rig.campaigns.running.test_runs import plan_with, running
@@ -235,6 +236,7 @@ import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 import rig, rig.errors
 from tests.rig.campaigns.running.test_change_of_plan import SECOND
+sys.dont_write_bytecode = True
 rig.run(SECOND).close()
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
 try:
@@ -248,7 +250,7 @@ except rig.errors.RecordingError as error:
 @pytest.mark.parametrize("room", [5_000, 1_200_000])
 def test_a_full_disk_in_the_second_part_keeps_the_first_and_what_fitted(output, room):
     before = output.read_bytes()
-    command = [sys.executable, "-c", FULL, str(output), str(room)]
+    command = [sys.executable, "-c", FORKED + FULL, str(output), str(room)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 7, done.stderr
     assert len(done.stdout.strip().splitlines()) == 1

@@ -22,6 +22,7 @@ from rig.loop.loop import Loop
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.tick.sequencer.segments import SettleRule
+from tests.forking import FORKED
 from tests.refused import refused
 from tests.rig.rigs import bench_with
 from tests.waiting import wait_until
@@ -59,7 +60,7 @@ sys.exit(0 if run.complete else 1)
 @contextlib.contextmanager
 def running(script, output, points):
     """A script in a process of its own that writes a recording, once that holds some points; none outlives the test."""
-    command = [sys.executable, "-c", script, str(output)]
+    command = [sys.executable, "-c", FORKED + script, str(output)]
     with subprocess.Popen(command, cwd=Path(__file__).parents[4]) as child:
         try:
             wait_until(lambda: _holds(output, points) or child.poll() is not None, f"{points} points")
@@ -140,7 +141,7 @@ def test_a_full_disk_ends_the_run_safely_and_keeps_what_was_recorded(tmp_path):
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "import rig\n"
         "from tests.rig.campaigns.running.test_runs import plan_with\n"
-        "run = rig.run('magnet-beam/backbone', seed=1)\n"  # kernels compiled before the disk is full
+        "sys.dont_write_bytecode = True; rig.run(plan_with(), seed=1).close()\n"  # kernels compiled before the disk is full
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2_500_000, 2_500_000))\n"
         "try:\n"
         "    rig.run(plan_with(), output=sys.argv[1], seed=1)\n"
@@ -149,7 +150,7 @@ def test_a_full_disk_ends_the_run_safely_and_keeps_what_was_recorded(tmp_path):
         "    sys.exit(7)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", "import rig.errors\n" + script, str(output)],
+        [sys.executable, "-c", FORKED + "import rig.errors\n" + script, str(output)],
         cwd=Path(__file__).parents[4],
         capture_output=True,
         text=True,

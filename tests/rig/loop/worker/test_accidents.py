@@ -20,6 +20,7 @@ from rig.loop.worker.queue_choice import presumed_latency, queue_of
 from rig.loop.worker.session import WorkerSession
 from rig.loop.worker.spawn import Worker
 from rig.tick.safety.layout import GuardMode
+from tests.forking import FORKED
 from tests.refused import refused
 from tests.rig.loop.worker.drivers import NotingDAQ
 from tests.rig.loop.worker.rigs import slow_bench, tone
@@ -127,7 +128,7 @@ def _rows_in(output):
 def _text_of_a_run_that_got_sigterm(folder, noting):
     log, output = folder / "outputs", folder / "run.h5"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(noting), str(ROOT), *filter(None, sys.path)])}
-    command = [sys.executable, "-c", CAMPAIGN, str(log), str(output)]
+    command = [sys.executable, "-c", FORKED + CAMPAIGN, str(log), str(output)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as campaign:
         wait_until(lambda: campaign.poll() is not None or _rows_in(output) > 1000, "rows of a run")
         campaign.send_signal(signal.SIGTERM)

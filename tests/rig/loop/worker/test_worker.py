@@ -21,6 +21,7 @@ from rig.loop.session import LocalSession, open_session
 from rig.loop.worker.session import WorkerSession
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.layout import SegmentKind
+from tests.forking import FORKED, fresh
 from tests.named_memory import named_memory
 from tests.refused import refused
 from tests.rig.loop.worker.rigs import RATE_HZ, VOLTS, slow_bench, tone
@@ -118,7 +119,7 @@ def test_when_the_campaign_is_killed_the_loop_ramps_down_and_leaves_nothing(tmp_
     before = named_memory()
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(noting), str(ROOT), *filter(None, sys.path)])}
     with subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(log)], stdout=subprocess.PIPE, text=True, env=environment
+        [sys.executable, "-c", FORKED + PARENT, str(log)], stdout=subprocess.PIPE, text=True, env=environment
     ) as parent:
         pid = int(parent.stdout.readline())
         parent.kill()
@@ -144,7 +145,10 @@ def test_when_the_loop_is_killed_the_campaign_says_so_and_keeps_its_rows(tmp_pat
                         if b"rig.loop.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
                             os.kill(int(pid), signal.SIGKILL)
 
-    with rig.run("magnet-beam/backbone", bench=slow_bench(), output=tmp_path / "run.h5", progress=Killer()) as run:
+    with (
+        fresh(),  # by whose name it is found
+        rig.run("magnet-beam/backbone", bench=slow_bench(), output=tmp_path / "run.h5", progress=Killer()) as run,
+    ):
         (part,) = run.recording.parts
         assert part.n_rows > 500
         assert "ended (SIGKILL)" in part.end["text"]

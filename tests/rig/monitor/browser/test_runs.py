@@ -8,6 +8,7 @@ import pytest
 
 from rig.monitor.sources import chosen
 from rig.recording.reader import Recording
+from tests.forking import FORKED
 from tests.rig.monitor.browser.test_browser import rows
 
 PLAN = """\
@@ -23,7 +24,7 @@ k2 = 6.283185307179586
 centre_frequency_hz = 24.0
 frequency_window_hz = [21.933, 26.807]
 """
-COMMAND = [sys.executable, "-c", "from rig.cli.app import main; main()", "run"]
+COMMAND = [sys.executable, "-c", f"{FORKED}from rig.cli.app import main; main()", "run"]
 WATCH = """
 window.seen = [];
 const note = () => window.seen.push(document.querySelectorAll("#points tbody tr").length);
