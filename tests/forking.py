@@ -24,7 +24,12 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 MODULES = (
     *("rig.emulator", "rig.loop.worker", "rig.monitor", "rig.conformance.driving", "rig.recording.whole_read"),
-    *("rig.monitor.folder_child", "tests.rig.emulator.host_process", "tests.rig.emulator.sound_host"),
+    *(
+        "rig.monitor.folder_child",
+        "rig.exchange.process",
+        "tests.rig.emulator.host_process",
+        "tests.rig.emulator.sound_host",
+    ),
     *("tests.reliability.kills.scene", "tests.rig.recording.writer_process"),
 )
 """What is forked of ``python -m``; so are the modules of `MODULES_OF`."""
@@ -132,9 +137,7 @@ def _the_server() -> tuple[socket.socket, dict[str, str]]:
         environment = dict(os.environ)
         command = [sys.executable, "-m", "tests.forking_server", str(theirs.fileno())]
         bare = {name: value for name, value in environment.items() if name != "PYTHONPATH"}
-        serving = subprocess.Popen(
-            command, pass_fds=[theirs.fileno()], env=bare, stdin=subprocess.DEVNULL, cwd=ROOT
-        )
+        serving = subprocess.Popen(command, pass_fds=[theirs.fileno()], env=bare, stdin=subprocess.DEVNULL, cwd=ROOT)
         theirs.close()
         atexit.register(_end, os.getpid(), ours, serving)
         _server[os.getpid()] = ours, environment

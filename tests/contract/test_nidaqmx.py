@@ -35,7 +35,7 @@ class TestOverADeviceServer(DriverContract):
     """Each call takes some milliseconds, so that blocks are few and large."""
 
     blocks = (16, 64)
-    long_run_blocks = 200
+    long_run_blocks = late_blocks = 100
     late_s = prompt_s = 10.0  # the server is in this process, on a machine that the tests keep busy
 
     @pytest.fixture(autouse=True)

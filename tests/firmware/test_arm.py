@@ -81,7 +81,13 @@ def test_a_fault_brings_the_output_to_0_v_and_ends_the_program(image: Path, tmp_
 
 
 class TestConformance(OverAPort):
-    """The contract of drivers, with the device in QEMU."""
+    """The contract of drivers, with the device in QEMU, a twentieth as fast as the same code on the host's processor.
+
+    What takes many blocks is looked at there (`tests.firmware.test_conformance`).
+    """
+
+    blocks = (1, 10)
+    long_run_blocks = 400
 
     @pytest.fixture(autouse=True, scope="class")
     @classmethod

@@ -4,11 +4,13 @@ import json
 import os
 import subprocess
 import sys
-from functools import cache
+from contextlib import chdir
 
 import pytest
 
+from tests.command import run_command
 from tests.recorded import recorded_at
+from tests.sharing import made_once, shared_folder
 
 PLAN = """
 kind = "backbone"
@@ -89,7 +91,7 @@ PARTS = (
 """Packages of the distribution and of Python that take long and of which few commands have use."""
 
 LOADED = f"""
-import atexit, json, sys
+import json, os, sys, traceback
 PARTS = {PARTS}
 
 def loaded():
@@ -100,74 +102,119 @@ def loaded():
     scipy = {{name for name in scipy if not name.startswith("scipy._") and hasattr(sys.modules[name], "__path__")}}
     return sorted(libraries | scipy | {{part for part in PARTS if part in sys.modules}})
 
-atexit.register(lambda: print(json.dumps(loaded()), file=open("loaded.json", "w")))
+def carried_out(code, words):
+    if not (child := os.fork()):
+        sys.argv, status, said = ["-c", *words], 1, os.open("said", os.O_CREAT | os.O_TRUNC | os.O_RDWR)
+        os.dup2(said, 1), os.dup2(said, 2)
+        try:
+            exec(code, {{"__name__": "__main__"}})
+            status = 0
+        except SystemExit as end:
+            status = int(end.code or 0)
+        except BaseException:
+            traceback.print_exc()
+        json.dump(loaded(), file := open("loaded.json", "w"))
+        for stream in (file, sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(status)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return dict(status=status, said=open("said").read()[-3000:], loaded=json.load(open("loaded.json")))
+
+found = {{}}
+for libraries, programs in json.load(sys.stdin):
+    for library in libraries:
+        __import__(library)
+    for code, line in programs:
+        found[code + line] = carried_out(code, line.split())
+json.dump(found, open(sys.argv[1], "w"))
 """
+"""Carries out programs, each in a fork of an interpreter that has loaded nothing but what all that still come may load."""
+
+MAIN = "from rig.cli import main; main()"
+STOPPING = f"import os; os.environ['VIBROLOCK_LIVE'] = 'nothing'; {MAIN}"
+PACKAGES = ("rig", "controller", "simulators", "identification", "vibrolock")
+DECLARING = (
+    "rig.tick.kernels",
+    "rig.tick.sequencer.kernels",
+    "controller.law",
+    "identification.models.pnlss.kernels",
+    "rig.campaigns.plans",
+)
+USED = {
+    "show run.h5": {"h5py", "numpy"},
+    "plot run.h5 -o run.png": {"matplotlib"},
+    "run plan.toml -o new.h5": {"numba", "rig.loop", "simulators"},
+    "check --bench magnet-beam -o check.h5": {"scipy.linalg"},
+}
+"""What commands must have loaded; they, and packages that must load nothing, begin with nothing."""
+STEPS = {"numpy": {"numpy"}, "pydantic": {"pydantic"}, "h5py": FILES, "numba": FILES | NUMBA}
+"""Libraries that are loaded one after the other, and what a command must be allowed to be carried out behind each."""
+
+
+def _programs():
+    """Libraries that are loaded, and the programs that are carried out then."""
+    bare = [(f"import {package}; dir({package})", "") for package in PACKAGES]
+    bare += [(f"import {module}", "") for module in DECLARING] + [(STOPPING, "stop")]
+    steps = [([], bare), *(([library], []) for library in STEPS)]
+    for line, allowed in ALLOWED.items():
+        behind = [number for number, needed in enumerate(STEPS.values(), 1) if needed <= allowed]
+        steps[0 if line in USED or not behind else _unbroken(behind)][1].append((MAIN, line))
+    return steps
+
+
+def _unbroken(behind):
+    """The last of the steps 1, 2, ... that are all there; 0 where the first is not."""
+    return max((number for number in behind if behind[:number] == list(range(1, number + 1))), default=0)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder with a plan, a recording and a model."""
-    folder = tmp_path_factory.mktemp("imports")
-    (folder / "plan.toml").write_text(PLAN)
-    recorded_at(folder / "run.h5", folder / "plan.toml")
-    _loaded(folder, "import sys; from rig.cli import main; main()", *["identify", "run.h5", "-o", "mode.h5"])
-    return folder
+def found():
+    """What each program came to, by its code and line, in a folder with a plan, a recording and a model."""
+
+    def make(folder):
+        (folder / "plan.toml").write_text(PLAN)
+        recorded_at(folder / "run.h5", folder / "plan.toml")
+        with chdir(folder):
+            run_command("identify run.h5 -o mode.h5").succeeded()
+        path = os.pathsep.join(sys.path)
+        environment = {**os.environ, "PYTHONPATH": path, "COVERAGE_PROCESS_START": "", "XDG_STATE_HOME": str(folder)}
+        asked = json.dumps(_programs())
+        subprocess.run(
+            [sys.executable, "-c", LOADED, "found.json"],
+            cwd=folder,
+            env=environment,
+            input=asked,
+            text=True,
+            check=True,
+        )
+
+    return json.loads((made_once(shared_folder() / "imports", make) / "found.json").read_text())
 
 
-def _loaded(folder, code, *arguments, status=0):
-    path = os.pathsep.join(sys.path)
-    environment = {**os.environ, "PYTHONPATH": path, "COVERAGE_PROCESS_START": "", "XDG_STATE_HOME": str(folder)}
-    command = [sys.executable, "-c", LOADED + code, *arguments]
-    out = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    assert out.returncode == status, out.stderr
-    return set(json.loads((folder / "loaded.json").read_text()))
-
-
-@cache
-def _loaded_by(folder, line):
-    """What a command that succeeds loads; two tests ask for some of them."""
-    return _loaded(folder, "from rig.cli import main; main()", *line.split())
+def _loaded(found, code, line="", status=0):
+    assert found[code + line]["status"] == status, found[code + line]["said"]
+    return set(found[code + line]["loaded"])
 
 
 @pytest.mark.parametrize("line", ALLOWED)
-def test_a_command_loads_what_it_uses_and_nothing_else(folder, line):
-    loaded = _loaded_by(folder, line)
-    assert loaded - LIGHT - ALLOWED[line] == set()
+def test_a_command_loads_what_it_uses_and_nothing_else(found, line):
+    assert _loaded(found, MAIN, line) - LIGHT - ALLOWED[line] == set()
 
 
-def test_stopping_loads_next_to_nothing(folder, monkeypatch):
-    monkeypatch.setenv("VIBROLOCK_LIVE", str(folder / "nothing"))
-    loaded = _loaded(folder, "from rig.cli import main; main()", "stop", status=1)
-    assert loaded - LIGHT - {"numpy", "pydantic", "rig.monitor"} == set()
+def test_stopping_loads_next_to_nothing(found):
+    assert _loaded(found, STOPPING, "stop", status=1) - LIGHT - {"numpy", "pydantic", "rig.monitor"} == set()
 
 
-@pytest.mark.parametrize(
-    ("line", "used"),
-    [
-        ("show run.h5", {"h5py", "numpy"}),
-        ("plot run.h5 -o run.png", {"matplotlib"}),
-        ("run plan.toml -o new.h5", {"numba", "rig.loop", "simulators"}),
-        ("check --bench magnet-beam -o check.h5", {"scipy.linalg"}),
-    ],
-)
-def test_what_a_command_uses_is_seen(folder, line, used):
-    assert used <= _loaded_by(folder, line)
+@pytest.mark.parametrize(("line", "used"), USED.items())
+def test_what_a_command_uses_is_seen(found, line, used):
+    assert used <= _loaded(found, MAIN, line)
 
 
-@pytest.mark.parametrize("package", ["rig", "controller", "simulators", "identification", "vibrolock"])
-def test_importing_a_package_loads_no_library_and_leaves_its_names_to_their_use(folder, package):
-    assert _loaded(folder, f"import {package}; dir({package})") - {"simulators"} == set()
+@pytest.mark.parametrize("package", PACKAGES)
+def test_importing_a_package_loads_no_library_and_leaves_its_names_to_their_use(found, package):
+    assert _loaded(found, f"import {package}; dir({package})") - {"simulators"} == set()
 
 
-@pytest.mark.parametrize(
-    "module",
-    [
-        "rig.tick.kernels",
-        "rig.tick.sequencer.kernels",
-        "controller.law",
-        "identification.models.pnlss.kernels",
-        "rig.campaigns.plans",
-    ],
-)
-def test_declaring_kernels_loads_no_compiler(folder, module):
-    assert "numba" not in _loaded(folder, f"import {module}")
+@pytest.mark.parametrize("module", DECLARING)
+def test_declaring_kernels_loads_no_compiler(found, module):
+    assert "numba" not in _loaded(found, f"import {module}")
