@@ -16,6 +16,8 @@ SOFTER = 0.8  # of the stiffness
 SOFTENING_PERIODS, SOFTENING_STEPS = 50.0, 20
 CLIPPED = 0.25  # of the largest voltage of the run without a fault
 LATE_S = {"2-ms-late": 2e-3, "5-ms-late": 5e-3, "10-ms-late": 10e-3}
+MOST_LATE_SAMPLES = 500
+"""More than any of them takes."""
 NEVER = 2**62
 
 
@@ -63,8 +65,13 @@ class BrokenRig:
         """One sample a voltage [n]; returns readings [n, n_channels] (V) and flags uint16[n]."""
         n = voltages.size
         readings, flags = np.empty((n, len(self._bench.channels))), np.empty(n, np.int64)
-        self._weaken()
-        given = self.arrays, self.state, self._observe, self._amplified(voltages), readings, self._truth_of(n), flags
+        near = (
+            self.first + 2 * n + MOST_LATE_SAMPLES > self._onset
+        )  # else nothing acts, and nothing is remembered for it
+        if near:
+            self._weaken()
+        sent = self._amplified(voltages) if near else voltages
+        given = self.arrays, self.state, self._observe, sent, readings, self._truth_of(n), flags
         if self._run is None:
             self._run = bound(run_observed, *given)
         self._run(*given)
@@ -72,7 +79,8 @@ class BrokenRig:
         self.sent.append(voltages.copy())
         self.true.append(readings.copy())
         self.motion.append(truth[:, :2].copy())
-        self._spoil(readings)
+        if near:
+            self._spoil(readings)
         self.first += n
         return readings, flags.astype(np.uint16)
 

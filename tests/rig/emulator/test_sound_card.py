@@ -43,6 +43,15 @@ def card(server):
         yield bench
 
 
+@pytest.fixture(scope="module")
+def lasting_card():
+    """Such a bench for tests that leave server and card as they are."""
+    with pytest.MonkeyPatch.context() as patched:
+        own_sound_server(patched)
+        with _card() as bench:
+            yield bench
+
+
 def _host(bench, what):
     host = subprocess.Popen(
         [sys.executable, "-m", "tests.rig.emulator.sound_host", what],
@@ -82,16 +91,16 @@ def _runs(process):
         return False
 
 
-def test_the_latency_is_that_of_the_graph_and_of_the_cards_converters(card):
+def test_the_latency_is_that_of_the_graph_and_of_the_cards_converters(lasting_card):
     rig = VirtualDAQ(card_bench(bench_with(), float(RATE_HZ))).rig
-    said = _said(card, "latency")
+    said = _said(lasting_card, "latency")
     assert said["from"] == "loopback channel loopback"
     assert said["frames"] == pytest.approx(PERIODS * 128 + 0.5 + rig.filter_delay_samples, abs=0.1)
 
 
-def test_what_is_put_out_comes_back_through_server_and_rig(card):
+def test_what_is_put_out_comes_back_through_server_and_rig(lasting_card):
     # where the server has left out the card, the cable is silent: most samples are right, whatever else the machine does
-    assert _said(card, "sine")["median_v"] < 1e-3
+    assert _said(lasting_card, "sine")["median_v"] < 1e-3
 
 
 def test_the_server_ends_with_a_card_that_is_killed(server):
