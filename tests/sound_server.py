@@ -1,9 +1,13 @@
 """A JACK server of a test's own, for the emulated sound card."""
 
+import itertools
 import os
 import shutil
 
 import pytest
+
+_numbers = itertools.count()
+"""Of the servers of this process, of which two may run at once."""
 
 
 def own_sound_server(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -13,7 +17,7 @@ def own_sound_server(monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.fail(missing)
     if missing:
         pytest.skip(missing)
-    monkeypatch.setenv("JACK_DEFAULT_SERVER", f"vibrolock-{os.getpid()}")
+    monkeypatch.setenv("JACK_DEFAULT_SERVER", f"vibrolock-{os.getpid()}-{next(_numbers)}")
     monkeypatch.setenv("JACK_NO_START_SERVER", "1")
     monkeypatch.setenv("JACK_NO_AUDIO_RESERVATION", "1")
 
