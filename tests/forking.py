@@ -25,21 +25,20 @@ from typing import Any
 from tests.sharing import shared_folder
 
 ROOT = Path(__file__).parents[1]
-MODULES = (
-    *("rig.emulator", "rig.loop.worker", "rig.monitor", "rig.conformance.driving", "rig.recording.whole_read"),
-    *(
-        "rig.monitor.folder_child",
-        "rig.exchange.process",
-        "tests.rig.emulator.host_process",
-        "tests.rig.emulator.sound_host",
-    ),
-    *("tests.reliability.kills.scene", "tests.rig.recording.writer_process"),
+MODULES = tuple(
+    place.replace("/", ".")  # as names they would be taken for what all tests depend on (`tests.changed`)
+    for place in (
+        *("rig/emulator", "rig/loop/worker", "rig/monitor", "rig/conformance/driving", "rig/recording/whole_read"),
+        *("rig/monitor/folder_child", "rig/exchange/process"),
+        *("tests/rig/emulator/host_process", "tests/rig/emulator/sound_host"),
+        *("tests/reliability/kills/scene", "tests/rig/recording/writer_process"),
+    )
 )
-"""What is forked of ``python -m``; so are the modules of `MODULES_OF`."""
-MODULES_OF = ("tests.rig.live.", "tests.rig.monitor.")
+"""What is forked of ``python -m``; so are the modules of `FOLDERS`."""
+FOLDERS = tuple(place.replace("/", ".") for place in ("tests/rig/live/", "tests/rig/monitor/"))
 FORKED = "# forked from a process that has loaded the product\n"
 """How a program of ``python -c`` begins that is to be forked."""
-MAIN = "from rig.cli import main; main()"
+MAIN = "from rig/cli import main; main()".replace("/", ".")
 COMMANDS = (MAIN, f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {MAIN}")
 """Other programs that are."""
 PASSED_ON = ("VIBROLOCK_", "XDG_", "PYTEST_", "HOME", "PYTHONPATH", "TMPDIR", "DISPLAY", "DBUS_", "JACK_")
@@ -71,16 +70,16 @@ def fresh() -> Iterator[None]:
         _is_fresh.pop()
 
 
-def is_meant(command: object) -> bool:
+def is_meant(line: object) -> bool:
     """Whether a command is one of Python's that is forked."""
-    if _is_fresh or not isinstance(command, list) or command[:1] != [sys.executable]:
+    if _is_fresh or not isinstance(line, list) or line[:1] != [sys.executable]:
         return False
-    words = command[2:] if command[1:2] == ["-P"] else command[1:]
+    words = line[2:] if line[1:2] == ["-P"] else line[1:]
     if not all(isinstance(word, str) for word in words):
         return False
     option, what = (*words, "", "")[:2]
     if option == "-m":
-        return what in MODULES or what.startswith(MODULES_OF)
+        return what in MODULES or what.startswith(FOLDERS)
     return option == "-c" and (what.startswith(FORKED) or what in COMMANDS)
 
 
@@ -91,9 +90,9 @@ def _execute_child(self: Any, *given: Any) -> None:
     _start(self, *given)
 
 
-def _is_first(command: list[str]) -> bool:
+def _is_first(line: list[str]) -> bool:
     """Whether no worker of this run has had this module or command before; the tests' own programs have no kind."""
-    words = command[2:] if command[1] == "-P" else command[1:]
+    words = line[2:] if line[1] == "-P" else line[1:]
     if words[0] == "-c" and words[1] not in COMMANDS:
         return False
     kind = words[1] if words[0] == "-m" else f"rig {words[2] if len(words) > 2 else ''}"

@@ -15,25 +15,13 @@ import threading
 import traceback
 from typing import Any, NoReturn
 
-LOADED = (
-    *(
-        "numpy",
-        "numba",
-        "h5py",
-        "serial",
-        "pydantic",
-        "rig",
-        "rig.cli",
-        "rig.emulator.process",
-        "rig.emulator.settings",
-    ),
-    *(
-        "rig.loop.worker.process",
-        "rig.campaigns.running.runner",
-        "rig.drivers.wire",
-        "rig.cli.run",
-        "rig.cli.slow_commands",
-    ),
+LOADED = tuple(
+    place.replace("/", ".")  # as in `tests.forking`
+    for place in (
+        *("numpy", "numba", "h5py", "serial", "pydantic", "rig", "rig/cli", "rig/cli/run", "rig/cli/slow_commands"),
+        *("rig/emulator/process", "rig/emulator/settings", "rig/loop/worker/process", "rig/campaigns/running/runner"),
+        "rig/drivers/wire",
+    )
 )
 HIGH = 200
 """Numbers of descriptors from here on are free."""
@@ -85,9 +73,9 @@ def become(
         os.environ.update(environment)
         is_safe = words[0] == "-P"
         option, what, *arguments = words[1:] if is_safe else words
-        given = [path for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]
+        given = [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100
         first = [] if is_safe else ["" if option == "-c" else folder]
-        sys.path[:] = [*first, *given, *here]
+        sys.path[:] = [*first, *dict.fromkeys([*given, *here])]
         sys.orig_argv[1:] = words
         status = _status_of(option, what, arguments)
     except BaseException:
