@@ -14,7 +14,9 @@ number of rigs if results are small and consumed as they arrive.
 from collections.abc import Callable, Generator, Iterable, Mapping
 from typing import TypeVar
 
-from joblib import Parallel, delayed
+from joblib import delayed
+
+from vibrolock.in_workers import results_of
 
 __all__ = ["VariantError", "ensemble"]
 
@@ -50,7 +52,7 @@ def ensemble(
     """
     named = variants.items() if isinstance(variants, Mapping) else enumerate(variants)
     calls = (delayed(_outcome)(function, str(name), variant) for name, variant in named)
-    yield from Parallel(n_jobs=n_jobs, return_as="generator")(calls)
+    return results_of(calls, n_jobs=n_jobs, return_as="generator")
 
 
 def _outcome(function: Callable[[Variant], Result], name: str, variant: Variant) -> tuple[str, Result]:

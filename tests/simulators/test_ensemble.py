@@ -50,6 +50,12 @@ def test_results_are_named_by_counting_where_no_names_are_given() -> None:
     assert list(ensemble([3.0, 4.0], square)) == [("0", 9.0), ("1", 16.0)]
 
 
+def test_who_has_enough_stops_without_a_warning() -> None:
+    found = ensemble(range(200), process, n_jobs=2)
+    next(found)
+    found.close()  # warnings are errors in tests
+
+
 def test_backend_of_the_user_is_honoured() -> None:
     with parallel_config(backend="threading", n_jobs=2):
         here = {result for _, result in ensemble(range(8), process)}

@@ -12,15 +12,17 @@ A fit uses as many threads as the linear algebra, but not all of an iteration ga
 more; ``parallel_config("loky", inner_max_num_threads=1)`` keeps the two from competing for cores.
 """
 
+import contextlib
 import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, same_data
+from vibrolock.in_workers import results_of
 
 MIXED = "mixed"
 """Name of the training set that holds all levels."""
@@ -210,11 +212,12 @@ def identify_many(
     left = [job for job in given if job.name not in done]
     calls = (delayed(_outcome)(identify, job) for job in left)
     # A worker holds its present job and one more, and results are yielded at once: memory does not grow with the study.
-    found = Parallel(n_jobs=n_jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)(calls)
-    for count, result in enumerate(found, len(given) - len(left) + 1):
-        if progress is not None:
-            progress(result, count, len(given))
-        yield result
+    found = results_of(calls, n_jobs=n_jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)
+    with contextlib.closing(found):
+        for count, result in enumerate(found, len(given) - len(left) + 1):
+            if progress is not None:
+                progress(result, count, len(given))
+            yield result
 
 
 def _outcome(identify: Callable[..., Fit], job: ModelJob) -> IdentifiedModel[Fit]:
