@@ -73,6 +73,9 @@ CANDIDATES = (
     Candidate((Masing(),), "joint", "a joint with any distribution of slips"),
     Candidate((BoucWen(),), "joint", "hysteresis that bends smoothly, or hardens", late=True),
 )
-"""Laws that need nothing from the user, in no order: their numbers and errors decide."""
+"""Laws that need nothing from the user, in no order: their numbers and errors decide.
+
+`Stribeck` is none of them: a regression does not tell it from `Coulomb`.
+"""
 PAIRS = (("spring", "damper"), ("spring", "joint"))
 """Families of laws that are tried together, the best of the first with each of the second. A joint is also a damper."""

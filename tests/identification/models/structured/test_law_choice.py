@@ -170,7 +170,7 @@ def test_a_law_that_cannot_be_fitted_is_listed_and_where_none_can_the_reason_is_
 
 def test_every_law_that_needs_nothing_from_the_user_is_a_candidate():
     kinds = {law.kind for one in CANDIDATES for law in one.laws}
-    assert kinds == set(LAWS) - {"user-spring"}
+    assert kinds == set(LAWS) - {"user-spring", "stribeck"}  # a regression does not tell it from `coulomb`
     names = [one.name for one in CANDIDATES]
     assert len(set(names)) == len(names)
     assert {one.family for one in CANDIDATES} == {family for pair in PAIRS for family in pair}
