@@ -65,7 +65,7 @@ NOT_RUN = {
     ("docs/how-to/watch-from-another-machine.md", "runs until Ctrl-C"),
     ("docs/reference/run-page.md", "takes a minute by the clock and needs Chromium"),
     ("docs/tutorials/a-driver.md", "installs a package"),
-    ("docs/how-to/reproduce-the-paper.md", "takes a quarter of an hour"),
+    ("docs/how-to/reproduce-the-paper.md", "takes some minutes"),
     ("docs/reference/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/reference/benchmarks.md", "takes minutes"),
     ("docs/reference/race-of-methods.md", "takes an hour"),
