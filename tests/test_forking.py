@@ -21,6 +21,9 @@ print(json.dumps({
 print("an error", file=sys.stderr)
 """
 
+CTRL_C = "import os, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+"""Begins a program that Ctrl-C ends, also where the tests were started in the background, which ignores it."""
+
 
 def said(code, *arguments, **options):
     command = [sys.executable, "-c", code, *arguments]
@@ -59,7 +62,7 @@ def test_a_forked_process_has_the_product_loaded_and_imports_nothing_from_its_pa
         ("import sys; sys.exit('bad')", 1, "bad"),
         ("raise KeyError('x')", 1, "KeyError: 'x'"),
         ("import os, signal; os.kill(os.getpid(), signal.SIGTERM)", -signal.SIGTERM, ""),
-        ("import os, signal; os.kill(os.getpid(), signal.SIGINT); import time; time.sleep(60)", -signal.SIGINT, None),
+        (f"{CTRL_C}os.kill(os.getpid(), signal.SIGINT); import time; time.sleep(60)", -signal.SIGINT, None),
         ("import atexit; atexit.register(print, 'end')", 0, ""),
         (
             "import threading, time; threading.Thread(target=lambda: (time.sleep(0.05), print('end'))).start()",
