@@ -332,12 +332,12 @@ def carried_out(bench_path: Path, folder: Path) -> dict[str, Any]:
         points = points_of(run.recording)
         out |= {"run_s": time.perf_counter() - began, "end": end}
     out["levels"] = len(tuned.levels.levels_m)
-    out |= _truth(tuned.bench, tuned.levels.levels_m)
-    out["points"] = [_compared(tuned.bench, point) for point in points]
+    out |= true_curve(tuned.bench, tuned.levels.levels_m)
+    out["points"] = [compared(tuned.bench, point) for point in points]
     return out
 
 
-def _truth(bench: Bench, levels_m: Any) -> dict[str, Any]:
+def true_curve(bench: Bench, levels_m: Any) -> dict[str, Any]:
     """The linear mode, and which of the plan's levels harmonic balance finds within the bench's limits."""
     subject = subject_of(bench)
     modes, mode = subject.rig.linear_modes, subject.mode
@@ -360,7 +360,8 @@ def _truth(bench: Bench, levels_m: Any) -> dict[str, Any]:
     return linear | {"within": within} | {name: values.tolist() for name, values in exact.items()}
 
 
-def _compared(bench: Bench, point: Point[Any]) -> dict[str, Any]:
+def compared(bench: Bench, point: Point[Any]) -> dict[str, Any]:
+    """What is said of a point, and, if it was accepted, its errors against harmonic balance."""
     out: dict[str, Any] = {
         "number": point.number,
         "level": point.level,

@@ -24,7 +24,7 @@ import tomli_w
 import typer
 
 import rig
-from benchmarks.random_rigs import _compared, _truth, drawn
+from benchmarks.random_rigs import compared, drawn, true_curve
 from rig.arming.run_options import RunOptions
 from rig.bench import load_bench
 from rig.campaigns.evaluation.recorded import points_of
@@ -66,7 +66,7 @@ def tried(path: Path) -> dict[str, Any]:
         "tested_v": tuned.test.level_rms_v,
         "notes": list(tuned.notes),
         "plan": plan.model_dump(mode="json"),
-        **_truth(bench, tuned.levels.levels_m),
+        **true_curve(bench, tuned.levels.levels_m),
     }
     began = time.perf_counter()
     with Recording(recording) as recorded:
@@ -98,7 +98,7 @@ def _run(bench: Any, plan: Any, path: Path, seed: int) -> dict[str, Any]:
         return {"not_run": str(error), "well": False, "tripped": False}
     with run:
         part = run.recording.parts[-1]
-        points = [_compared(bench, point) for point in points_of(run.recording)]
+        points = [compared(bench, point) for point in points_of(run.recording)]
         end = part.end or {"reason": "none", "text": "", "tripped": False}
         found = {
             "end": str(end["reason"]),

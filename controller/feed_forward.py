@@ -12,9 +12,8 @@ BACKBONE = record(i8="points", f8="level level_1 omega_1 level_2 omega_2 level_3
 ``level``: the level at the last sample, in the unit of the plan's levels."""
 
 LARGEST_RATIO = 3.0  # of the slope to that between the last two levels: the parabola is not believed beyond
-NEAREST = (
-    0.25  # of a step of the level: levels nearer to each other than this tell no slope for it, for noise is multiplied
-)
+NEAREST = 0.25
+"""Part of a step of the level: levels nearer to each other tell no slope for that step, since noise would be multiplied."""
 
 
 @inner_kernel

@@ -39,9 +39,7 @@ TRIES = 5  # requests before a device counts as silent; chosen
 ANSWER_S = 0.1  # s that an answer may take; chosen
 DOUBLED_ANSWERS = 8  # from this many on two devices answer; the wire itself may repeat a single frame
 WAITING_BLOCKS = 4096  # messages that are kept while an answer is awaited; chosen: seconds of a stream
-REMEMBERED_ANSWERS = (
-    254  # as many as there are numbers beside the next: a second device may answer long after the first
-)
+REMEMBERED_ANSWERS = 254  # all numbers but the next: a second device may answer long after the first
 
 
 class Dialogue:
@@ -136,9 +134,7 @@ class Dialogue:
         known = next(
             (one for one in self._answered if (one[0].number, one[0][2:4]) == (answer.number, answer[2:4])), None
         )
-        if (
-            known is None or known[1] > 1
-        ):  # a request that was sent twice may be answered twice, and what it asks for change
+        if known is None or known[1] > 1:  # one that was sent twice may be answered twice, with what has changed
             return
         if answer == known[0]:
             self._doubled += 1

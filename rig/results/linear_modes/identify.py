@@ -20,6 +20,7 @@ from identification import (
 )
 from identification.common import one_specimen
 from rig.bench import Bench
+from rig.bench.user_code import named_code
 from rig.campaigns.kinds import kinds_that_yield
 from rig.drivers import make_daq
 from rig.errors import RecordingError, RigError
@@ -90,8 +91,11 @@ class _Level:
         )
 
     def image_error(self) -> Complex | None:
-        """Error of ``fitted`` by images of the held output; None where the driver does not know them."""
-        if self.bench is None:
+        """Error of ``fitted`` by images of the held output; None where the driver does not know them.
+
+        It is also None for a recorded bench that names code, which would be imported: identifying trusts no recording.
+        """
+        if self.bench is None or named_code(self.bench):
             return None
         try:
             shares = make_daq(self.bench).image_shares(self.fitted.frequency_hz)

@@ -44,6 +44,17 @@ stop_hz = 23.0
 rate_hz_per_s = 2.0
 levels_v = [0.1]
 """
+LINES = """
+kind = "multisine"
+bench = "bench.toml"
+lowest_hz = 15.0
+highest_hz = 35.0
+resolution_hz = 0.5
+transient_periods = 3
+periods = 2
+realisations = 2
+levels_rms_v = [0.05]
+"""
 OTHER = PLAN.replace("[0.1]", "[0.1, 0.2]")
 
 
@@ -119,6 +130,16 @@ def test_a_recording_is_shown_plotted_exported_and_completed_without_its_code(la
     with Recording("run.h5") as recording:
         assert remaining(recording).to_measure == ()
         assert len(sweeps(recording)) == 1
+    assert not Path("imported.txt").exists()
+    assert lab not in sys.modules
+
+
+def test_linear_modes_are_identified_without_the_code_of_the_recorded_bench(lab, command):
+    Path("lines.toml").write_text(LINES)
+    assert command("run lines.toml -o lines.h5")[0] == 0
+    forgotten(lab)
+    status, _, err = command("identify linear lines.h5 --count 1 -o modes.h5")
+    assert status == 0, err
     assert not Path("imported.txt").exists()
     assert lab not in sys.modules
 
