@@ -1,25 +1,53 @@
 """A JACK server of a test's own, for the emulated sound card."""
 
-import itertools
+import fcntl
 import os
 import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import pytest
 
-_numbers = itertools.count()
-"""Of the servers of this process, of which two may run at once."""
+from tests.running import MEMORY
+
+NAMES = 5
+"""Names of servers. JACK counts eight servers on a machine, and one that was killed until another takes its name."""
+LONGEST_WAIT_S = 300.0
+"""For one of the names, while other tests have them."""
 
 
-def own_sound_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give processes that this test starts a server of their own; without JACK it skips, or fails where that must be there."""
+@contextmanager
+def own_sound_server(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Give the processes of this context a server of their own; without JACK it skips, or fails where that must be there."""
     missing = _missing()
     if missing and os.environ.get("VIBROLOCK_SOUND") == "required":
         pytest.fail(missing)
     if missing:
         pytest.skip(missing)
-    monkeypatch.setenv("JACK_DEFAULT_SERVER", f"vibrolock-{os.getpid()}-{next(_numbers)}")
-    monkeypatch.setenv("JACK_NO_START_SERVER", "1")
-    monkeypatch.setenv("JACK_NO_AUDIO_RESERVATION", "1")
+    with _own_name() as name:
+        monkeypatch.setenv("JACK_DEFAULT_SERVER", name)
+        monkeypatch.setenv("JACK_NO_START_SERVER", "1")
+        monkeypatch.setenv("JACK_NO_AUDIO_RESERVATION", "1")
+        yield
+
+
+@contextmanager
+def _own_name() -> Iterator[str]:
+    """A name that no other test of this machine and user has meanwhile."""
+    folder = MEMORY if MEMORY.is_dir() else Path(tempfile.gettempdir())  # the same for all runs of the tests
+    until = time.monotonic() + LONGEST_WAIT_S
+    while time.monotonic() < until:
+        for number in range(NAMES):
+            name = f"vibrolock-test-{number}"
+            with (folder / f"{name}-{os.getuid()}.lock").open("w") as lock, suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                yield name
+                return
+        time.sleep(0.2)
+    pytest.fail(f"other tests have all {NAMES} names of sound servers")
 
 
 def _missing() -> str:

@@ -13,10 +13,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -37,8 +38,8 @@ RATE_HZ, PERIOD = 48000, 128
 """Sample rate, Hz, and frames of a period of a server that is started here."""
 SET_PARENT_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of <sys/prctl.h>."""
-START_S = 5.0
-"""Longest wait for a server to answer, s."""
+START_S = 15.0
+"""Longest wait for a server to answer, and to end, s."""
 DECIMATION = 4
 """Frames of the card in a sample of the bench that reaches it: 12 kHz of 48 kHz."""
 LOOPBACK = Channel(name="loopback", role="monitor", unit="V", sensitivity_v_per_unit=1.0, range_v=10.0, loopback=True)
@@ -220,27 +221,37 @@ def _server(jack: Any) -> Iterator[None]:
     if program is None:
         raise DaqRefused("the program jackd is not installed; on Debian: apt install jackd2")
     command = [program, *_scheduling(), "-S", "-d", "dummy", "-r", str(RATE_HZ), "-p", str(PERIOD)]
-    server = subprocess.Popen(
-        command,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-        preexec_fn=_end_with_parent if sys.platform == "linux" else None,
-    )
-    try:
-        until = time.monotonic() + START_S
-        while not _answers(jack):
-            if server.poll() is not None or time.monotonic() > until:
-                raise DaqError(f"{' '.join(command)}: the server has not begun to answer")
-            time.sleep(0.05)
-        yield
-    finally:
-        server.send_signal(signal.SIGTERM)
+    with tempfile.TemporaryFile() as said:
+        server = subprocess.Popen(
+            command,
+            stdout=subprocess.DEVNULL,
+            stderr=said,
+            start_new_session=True,
+            preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+        )
         try:
-            server.wait(START_S)
-        except subprocess.TimeoutExpired:
-            server.kill()
-            server.wait()
+            until = time.monotonic() + START_S
+            while not _answers(jack):
+                ended = server.poll() is not None
+                if ended or time.monotonic() > until:
+                    what = "has ended" if ended else f"has not begun to answer within {START_S:g} s"
+                    raise DaqError(f"{' '.join(command)}: the server {what}{_last_lines(said)}")
+                time.sleep(0.05)
+            yield
+        finally:
+            server.send_signal(signal.SIGTERM)
+            try:
+                server.wait(START_S)
+            except subprocess.TimeoutExpired:
+                server.kill()
+                server.wait()
+
+
+def _last_lines(said: IO[bytes]) -> str:
+    """What a server has said of its end, on one line."""
+    said.seek(0)
+    lines = said.read().decode(errors="replace").splitlines()
+    return "".join(f"; {line.strip()}" for line in lines[-3:] if line.strip())
 
 
 def _end_with_parent() -> None:

@@ -67,9 +67,14 @@ def ended(words):
     return out
 
 
+@pytest.fixture
+def server(monkeypatch):
+    with own_sound_server(monkeypatch):
+        yield
+
+
 @pytest.mark.slow
-def test_the_commands_of_the_page_lead_from_the_devices_to_a_figure_and_to_a_calibration(monkeypatch, tmp_path):
-    own_sound_server(monkeypatch)
+def test_the_commands_of_the_page_lead_from_the_devices_to_a_figure_and_to_a_calibration(server, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))  # no trip of another run
     monkeypatch.chdir(tmp_path)
     (emulate,), (emulate_cables,) = commands("runs until Ctrl-C")

@@ -17,6 +17,7 @@ from rig.conformance.without_host import KILLING_TEST
 from rig.drivers.virtual import VirtualDAQ
 from rig.emulator.emulated import Emulator, emulated
 from rig.emulator.sound import RATE_HZ, card_bench
+from rig.errors import DaqError
 from tests.rig.rigs import bench_with
 from tests.sound_server import own_sound_server
 
@@ -28,7 +29,8 @@ BUSY = ("lost frames in each", "samples were lost")
 
 @pytest.fixture
 def server(monkeypatch):
-    own_sound_server(monkeypatch)
+    with own_sound_server(monkeypatch):
+        yield
 
 
 def _card(**settings):
@@ -46,10 +48,8 @@ def card(server):
 @pytest.fixture(scope="module")
 def lasting_card():
     """Such a bench for tests that leave server and card as they are."""
-    with pytest.MonkeyPatch.context() as patched:
-        own_sound_server(patched)
-        with _card() as bench:
-            yield bench
+    with pytest.MonkeyPatch.context() as patched, own_sound_server(patched), _card() as bench:
+        yield bench
 
 
 def _host(bench, what):
@@ -101,6 +101,15 @@ def test_the_latency_is_that_of_the_graph_and_of_the_cards_converters(lasting_ca
 def test_what_is_put_out_comes_back_through_server_and_rig(lasting_card):
     # where the server has left out the card, the cable is silent: most samples are right, whatever else the machine does
     assert _said(lasting_card, "sine")["median_v"] < 1e-3
+
+
+def test_a_server_that_does_not_start_says_why(server, monkeypatch, tmp_path):
+    program = tmp_path / "jackd"
+    program.write_text("#!/bin/sh\necho Too many servers already active >&2\nexit 255\n")
+    program.chmod(0o700)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    with pytest.raises(DaqError, match="the server has ended; Too many servers already active"):
+        Emulator(bench_with(), "sound", lockstep=False).start()
 
 
 def test_the_server_ends_with_a_card_that_is_killed(server):
