@@ -16,6 +16,7 @@ from identification.models.structured.laws import (
     PolynomialSpring,
     SplineSpring,
     Stop,
+    Stribeck,
 )
 
 AUTO = "auto"
@@ -37,6 +38,8 @@ class Candidate(NamedTuple):
     """Number of the first laws that keep the numbers in which they are not linear until they are fitted."""
     late: bool = False
     """Whether it is tried alone, and only if no other explains the data: its steps take many times as long as others."""
+    refines: str = ""
+    """Kind of the law that a late one refines: it is tried only if that one is kept."""
 
     @property
     def numbers(self) -> int:
@@ -72,10 +75,9 @@ CANDIDATES = (
     Candidate((Iwan(),), "joint", "a bolted joint: micro-slip by four numbers"),
     Candidate((Masing(),), "joint", "a joint with any distribution of slips"),
     Candidate((BoucWen(),), "joint", "hysteresis that bends smoothly, or hardens", late=True),
+    Candidate((Stribeck(),), "joint", "dry friction that is larger at rest", late=True, refines=Coulomb.kind),
 )
-"""Laws that need nothing from the user, in no order: their numbers and errors decide.
-
-`Stribeck` is none of them: a regression does not tell it from `Coulomb`.
-"""
+"""Laws that need nothing from the user, in no order: their numbers and errors decide. A regression does not tell `Stribeck`
+from `Coulomb`."""
 PAIRS = (("spring", "damper"), ("spring", "joint"))
 """Families of laws that are tried together, the best of the first with each of the second. A joint is also a damper."""

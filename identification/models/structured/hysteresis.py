@@ -11,9 +11,12 @@ force a piece ends, after a way that is Gauss' quadrature of ``1/g``. The work i
 a step belongs to the change of the state. ``g`` is larger below zero (unloading) than above (loading) at the same ``|w|``, so
 that the work is never less than the rise of the energy ``integral of r dr/(k g(-|r|/y))`` that unloading gives back.
 
-Dry friction has no memory. Over a step it is ``k`` times the way, at most the largest force, with a k so large that a step that
-holds hardly moves; the work is never negative. By Stribeck's law it falls from the largest force at rest with the way of a
-step, that is with the speed, as ``y + (largest - y) exp(-(way/gamma)^2)``, with the way gamma of a step at Stribeck's speed.
+Dry friction has no memory. It brings a step to rest at its end where it can, that is after half of the way at the speed at
+its beginning: a step without way would end at the opposite speed, and so on. Within its largest force it is ``k`` times the
+way beyond that, with a k so large that this is hardly moved. It is zero between that way and none, and along a way back it is
+a force the other way, so that its work is never negative. By Stribeck's law it falls from the largest force at rest with the
+way of a step, that is with the speed, as ``y + (largest - y) exp(-(way/gamma)^2)``, with the way gamma of a step at
+Stribeck's speed.
 
 A row of `Tables.bends` is ``[y, n, gamma]``; n is 0 for a Jenkins slider and below zero for dry friction, with gamma 0 where it
 does not depend on the speed.
@@ -103,18 +106,39 @@ def dry_friction(at_rest: float, sliding: float, scale: float, speed: float) -> 
 
 
 @kernel
+def before(r: float, bend: np.ndarray, to_rest: float) -> float:
+    """Return what a step of a hysteresis or a slider begins with: its force ``r``; dry friction with its way to rest."""
+    return to_rest if bend[1] < 0.0 else r
+
+
+@kernel
+def dry_step(size: float, by_size: float, k: float, way: float, to_rest: float) -> tuple[float, float, float]:
+    """Return the mean of dry friction over a step, and its derivatives by ``way`` and by ``to_rest``.
+
+    ``size`` and ``by_size``: its largest value, and the derivative of that by the size of ``way``.
+    """
+    if min(to_rest, 0.0) < way < max(to_rest, 0.0):
+        return 0.0, 0.0, 0.0
+    held = to_rest if way * to_rest > 0.0 else 0.0
+    pull = k * (way - held)
+    if abs(pull) >= size:
+        return math.copysign(size, pull), by_size, 0.0
+    return pull, k, -k if held != 0.0 else 0.0
+
+
+@kernel
 def hysteresis_step(
     r: float, k: float, largest: float, y: float, n: float, gamma: float, way: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Move a hysteresis with the force ``r`` along ``way``.
+    """Move a hysteresis with the force ``r`` (dry friction: with ``r`` as its way to rest, `before`) along ``way``.
 
     Return mean force, force at the end, the derivatives of the mean by ``way`` and by ``r``, and those of the end. They follow
     from the equation, which knows x by its differential only: ``d w/d w0 = g(w)/g(w0)``.
     """
     if n < 0.0:
-        size, by = dry_friction(largest, y, gamma, abs(way))
-        dry, by = (k * way, k) if abs(k * way) < size else (math.copysign(size, way), by)
-        return dry, dry, by, 0.0, by, 0.0
+        size, by_size = dry_friction(largest, y, gamma, abs(way))
+        dry, by, by_rest = dry_step(size, by_size, k, way, r)
+        return dry, dry, by, by_rest, by, by_rest
     sign = math.copysign(1.0, way)
     most = largest / y
     first = min(sign * r / y, most)
@@ -132,7 +156,10 @@ def hysteresis_step(
 
 @inner_kernel
 def slider_step(r: float, slider: np.ndarray, bend: np.ndarray, way: float) -> tuple[float, float, float]:
-    """Move a slider or a hysteresis; return mean force, force at the end, and the derivative of the mean by ``way``."""
+    """Move a slider or a hysteresis; return mean force, force at the end, and the derivative of the mean by ``way``.
+
+    ``r`` is that of `before`.
+    """
     if bend[1] == 0.0:
         mean, end, by_way, _ = jenkins_step(r, slider[0], slider[1], way)
         return mean, end, by_way
@@ -169,7 +196,7 @@ def joint_forces(sliders: np.ndarray, bends: np.ndarray, x: np.ndarray, out: np.
         r, last = 0.0, x[x.size - 1]
         for repeat in range(2):
             for k in range(x.size):
-                r = slider_step(r, sliders[s], bends[s], x[k] - last)[1]
+                r = slider_step(before(r, bends[s], 0.0), sliders[s], bends[s], x[k] - last)[1]
                 last = x[k]
                 if repeat == 1:
                     out[k] += r

@@ -137,10 +137,11 @@ class _Choice(Generic[T]):
             self._fit_rivals([self._linear])
             if self._lacking():
                 self._fit_rivals(self._single)
-        if self._late and self._lacking():
-            late = self._by_residual(self._late)
-            self._fit_rivals(late, below=self._least())
-            self._single += late
+        late = [one for one in self._late if not one.refines or one.refines in self._kinds()]
+        if late and self._lacking():
+            regressed = self._by_residual(late)
+            self._fit_rivals(regressed, below=self._least())
+            self._single += regressed
         rest = [one for one in self._paired if one not in pairs]
         if rest and self._lacking():
             self._fit_rivals(rest[:1], below=self._least())
@@ -225,6 +226,9 @@ class _Choice(Generic[T]):
     def _least(self) -> float:
         """Return the least error of the short fits of what was fitted; inf without any."""
         return min((one.screening for one in self._fitted if not math.isnan(one.screening)), default=math.inf)
+
+    def _kinds(self) -> list[str]:
+        return [] if self._kept is None else [law.kind for law in self._kept.candidate.laws]
 
     def _settled(self) -> bool:
         return self._kept is not None and self._kept.explained

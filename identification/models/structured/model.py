@@ -312,6 +312,7 @@ def workspace_for(system: System, columns: int = 0) -> Workspace:
         free=np.zeros(n),
         u=np.zeros(inputs),
         w=np.zeros(elements),
+        begun=np.zeros(elements),
         forces=np.zeros((elements, 3)),
         coupling=np.zeros((elements, elements)),
         change=np.zeros((elements, 1)),

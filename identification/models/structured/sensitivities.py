@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.models.structured.elements import DerivativeTables
-from identification.models.structured.hysteresis import hysteresis_by, hysteresis_step
+from identification.models.structured.hysteresis import before, hysteresis_by, hysteresis_step
 from identification.models.structured.kernels import damping_at, jenkins_step, mean_spring, spring_at
 from identification.models.structured.steps import (
     System,
@@ -232,23 +232,37 @@ def of_slips(system: System, work: Workspace, e: int, derivatives: Sensitivities
 
 @inner_kernel
 def of_hystereses(system: System, work: Workspace, e: int, state: np.ndarray, derivatives: Sensitivities) -> None:
-    """Add what the forces of an element's hystereses at the beginning of a step change of their mean to ``work.dforce``."""
+    """Add what an element's hystereses begin a step with changes of their mean forces to ``work.dforce``."""
     n, tables, way = system.omega.size, system.tables, system.step_s * work.w[e]
+    to_rest = 0.5 * system.step_s * work.begun[e]
     if not tables.bent[e]:
         return
     for s in range(tables.first[e], tables.first[e + 1]):
         bend, at = tables.bends[s], 2 * n + 1 + s
+        if bend[1] < 0.0:
+            of_rest(system, e, state, derivatives, derivatives.rows[at])
         if bend[1] != 0.0:
-            by_r = hysteresis_step(
-                state[at], tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], way
-            )[3]
+            r = before(state[at], bend, to_rest)
+            by_r = hysteresis_step(r, tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], way)[3]
             add(work.dforce, by_r, derivatives.rows[at])
+
+
+@inner_kernel
+def of_rest(system: System, e: int, state: np.ndarray, derivatives: Sensitivities, row: np.ndarray) -> None:
+    """Write the derivatives of the way after which a step of an element ends at rest."""
+    n, half = system.omega.size, 0.5 * system.step_s
+    begin = 2 * n + n * system.inputs + e * n
+    row[:] = 0.0
+    for i in range(n):
+        add(row, half * system.phi[e, i], derivatives.rows[n + i])
+        row[begin + i] += half * state[n + i]
 
 
 @inner_kernel
 def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int, x: float, state: np.ndarray) -> None:
     """Add the derivatives of an element's mean force over a step from ``x`` by the numbers of its laws to ``work.dforce``."""
-    begin, way, reach = law_columns(system), system.step_s * work.w[e], system.tables.limits[e, 0]
+    n, h = system.omega.size, system.step_s
+    begin, way, reach = law_columns(system), h * work.w[e], system.tables.limits[e, 0]
     springs, dampers, tables = changes.springs.shape[0], changes.dampers.shape[0], system.tables
     for k in range(springs + dampers):
         if changes.element[k] != e:
@@ -265,7 +279,7 @@ def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int,
         for s in range(changes.first[k], changes.last[k]):
             by, share = changes.sliders[k, s], work.stuck[s]
             if tables.bent[e] and tables.bends[s, 1] != 0.0:
-                r, by_bend = state[2 * system.omega.size + 1 + s], changes.bends[k, s]
+                r, by_bend = before(state[2 * n + 1 + s], tables.bends[s], 0.5 * h * work.begun[e]), changes.bends[k, s]
                 total += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[0]
                 continue
             total += sign * (1.0 - share) * by[1] + 0.5 * share * share * way * by[0]
@@ -285,16 +299,16 @@ def end_sliders(
 
     ``rhs``: derivatives of the mean velocities of the step.
     """
-    n, tables = system.omega.size, system.tables
+    n, h, tables = system.omega.size, system.step_s, system.tables
     end_hystereses(system, work, state, derivatives, rhs)
     joints = changes.springs.shape[0] + changes.dampers.shape[0]
     for k in range(changes.sliders.shape[0]):
         e, column = changes.element[joints + k], law_columns(system) + joints + k
-        way = system.step_s * work.w[e]
+        way, to_rest = h * work.w[e], 0.5 * h * work.begun[e]
         for s in range(changes.first[k], changes.last[k]):
             by, own = changes.sliders[k, s], derivatives.rows[2 * n + 1 + s]
             if tables.bent[e] and tables.bends[s, 1] != 0.0:
-                r, by_bend = state[2 * n + 1 + s], changes.bends[k, s]
+                r, by_bend = before(state[2 * n + 1 + s], tables.bends[s], to_rest), changes.bends[k, s]
                 own[column] += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[1]
             elif derivatives.sticks[s]:
                 own[column] += way * by[0]
@@ -323,8 +337,9 @@ def end_hystereses(
                     add(work.row, system.phi[e, i], rhs[i])
                     work.row[begin + i] += work.mean[i]
                 ready = True
+            r = before(state[at], bend, 0.5 * h * work.begun[e])
             _, _, _, _, by_way, by_r = hysteresis_step(
-                state[at], tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], h * work.w[e]
+                r, tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], h * work.w[e]
             )
             own = derivatives.rows[at]
             for c in range(own.size):

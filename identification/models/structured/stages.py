@@ -14,7 +14,7 @@ from identification.fitting.levenberg_marquardt import Minimum
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementPlan, Scores
-from identification.models.structured.laws import Law
+from identification.models.structured.laws import Joint, Law
 from identification.models.structured.missing import MissingForce, missing_forces
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.nudging import Nudging, settling_periods, with_lead_in_periods
@@ -187,7 +187,12 @@ class ElementFits:
             if model.elements or between:
                 found = with_further_element(model, self._experiments, self._nudged, laws, between, self._reach, held)
                 return [found]
-            return element_starts(model, self._experiments, self._nudged, laws, self._reach, held)
+            found = element_starts(model, self._experiments, self._nudged, laws, self._reach, held)
+            if any(isinstance(law, Joint) and not law.sticks for law in laws):
+                # that force jumps where the element turns, which is not where a mode does: a direction comes first
+                further = with_further_element(model, self._experiments, self._nudged, laws, (), self._reach, held)
+                return [further._replace(residual=found[0].residual), *found]
+            return found
 
     def _from(self, start: StructuredModel) -> Fitted:
         return _fitted(start, self._linear, self._modes, self._experiments, self._nudged, self._support, self._watch)

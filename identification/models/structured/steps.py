@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.models.structured.elements import Tables
-from identification.models.structured.hysteresis import slider_step
+from identification.models.structured.hysteresis import before, slider_step
 from identification.models.structured.kernels import damping_at, jenkins_step, spring_at, step_force
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
@@ -72,6 +72,8 @@ class Workspace(NamedTuple):
     free: np.ndarray
     u: np.ndarray
     w: np.ndarray
+    begun: np.ndarray
+    """float[n_elements]: rate of each element at the beginning of the step."""
     forces: np.ndarray
     coupling: np.ndarray
     change: np.ndarray
@@ -132,7 +134,7 @@ def take_step(system: System, work: Workspace, q: np.ndarray, v: np.ndarray, r: 
         work.free[i] = push / work.effective_stiffness[i]
         work.mean[i] = work.free[i]
     for e in range(elements):
-        work.w[e] = dot(v, system.phi[e])
+        work.begun[e] = work.w[e] = dot(v, system.phi[e])
     solved = elements == 0
     for iteration in range(NEWTON if elements else 0):
         if newton(system, work, q, r, 1.0 if iteration < CAREFUL else 0.5):
@@ -152,17 +154,19 @@ def evaluate(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, e: i
     x = dot(q, system.phi[e])
     force, by_x, by_w = step_force(x, work.w[e], h, tables.springs[e], tables.dampers[e], tables.limits[e])
     for s in range(tables.first[e], tables.first[e + 1]):
-        mean, _, by_way = joint_step(tables, e, s, r[s], h * work.w[e])
+        mean, _, by_way = joint_step(tables, e, s, r[s], h * work.w[e], 0.5 * h * work.begun[e])
         force += mean
         by_w += h * by_way
     work.forces[e, 0], work.forces[e, 1], work.forces[e, 2] = force, by_x, by_w
 
 
 @inner_kernel
-def joint_step(tables: Tables, e: int, s: int, r: float, way: float) -> tuple[float, float, float]:
-    """Move a slider of an element as `slider_step` does."""
+def joint_step(
+    tables: Tables, e: int, s: int, r: float, way: float, to_rest: float
+) -> tuple[float, float, float]:
+    """Move a slider of an element as `slider_step` does; after the way ``to_rest`` a step ends at rest."""
     if tables.bent[e]:
-        return slider_step(r, tables.sliders[s], tables.bends[s], way)
+        return slider_step(before(r, tables.bends[s], to_rest), tables.sliders[s], tables.bends[s], way)
     mean, end, by_way, _ = jenkins_step(r, tables.sliders[s, 0], tables.sliders[s, 1], way)
     return mean, end, by_way
 
@@ -174,6 +178,15 @@ def is_dry(tables: Tables, e: int) -> bool:
     for s in range(tables.first[e], tables.first[e + 1]):
         dry = dry or tables.bends[s, 1] < 0.0
     return dry
+
+
+@inner_kernel
+def up_to_steps(w: float, change: float, to_rest: float) -> float:
+    """Return the change of a rate as far as the next step of dry friction: at no rate, or at that with which it comes to rest."""
+    for at in (0.0, to_rest):
+        if (w - at) * (w + change - at) < 0.0:
+            change = at - w
+    return change
 
 
 @inner_kernel
@@ -198,8 +211,8 @@ def newton(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, share:
             done = False
     for e in range(elements):
         change = work.change[e, 0] * (1.0 if done else share)  # the last one is taken whole
-        if not done and work.w[e] * (work.w[e] + change) < 0.0 and is_dry(system.tables, e):
-            change = -work.w[e]  # the force has a step there
+        if not done and is_dry(system.tables, e):
+            change = up_to_steps(work.w[e], change, 0.5 * work.begun[e])
         work.w[e] += change
         work.forces[e, 0] += change * work.forces[e, 2]
     return done
@@ -248,7 +261,8 @@ def end_step(system: System, work: Workspace, q: np.ndarray, v: np.ndarray, stat
     for e in range(system.phi.shape[0]):
         for s in range(tables.first[e], tables.first[e + 1]):
             at = 2 * n + 1 + s
-            state[at] = joint_step(tables, e, s, state[at], system.step_s * work.w[e])[1]
+            way, to_rest = system.step_s * work.w[e], 0.5 * system.step_s * work.begun[e]
+            state[at] = joint_step(tables, e, s, state[at], way, to_rest)[1]
     for i in range(q.size):
         there += system.b[i, 0] * (q[i] + 0.5 * system.step_s * work.mean[i])
         q[i] += system.step_s * work.mean[i]

@@ -170,7 +170,7 @@ def test_a_law_that_cannot_be_fitted_is_listed_and_where_none_can_the_reason_is_
 
 def test_every_law_that_needs_nothing_from_the_user_is_a_candidate():
     kinds = {law.kind for one in CANDIDATES for law in one.laws}
-    assert kinds == set(LAWS) - {"user-spring", "stribeck"}  # a regression does not tell it from `coulomb`
+    assert kinds == set(LAWS) - {"user-spring"}
     names = [one.name for one in CANDIDATES]
     assert len(set(names)) == len(names)
     assert {one.family for one in CANDIDATES} == {family for pair in PAIRS for family in pair}
@@ -200,3 +200,15 @@ def test_a_law_whose_steps_are_long_is_tried_last_and_alone():
     fits = StandIn(short, short, linear_and(iwan=NOISE, bouc_wen=NOISE))
     assert chosen(fits)[0] == "iwan"
     assert "bouc-wen" not in fits.screens
+
+
+@pytest.mark.parametrize(("kept", "tried"), [("coulomb", True), ("jenkins", False)])
+def test_a_law_that_refines_another_is_tried_where_that_is_kept_and_lacks_something(kept, tried):
+    short = linear_and(**{kept: 0.03}, stribeck=0.02)
+    fits = StandIn(short, short, linear_and(**{kept: 0.02}, stribeck=NOISE))
+    found, _ = chosen(fits)
+    assert ("stribeck" in fits.screens) == tried
+    assert found == ("stribeck" if tried else kept)
+    fits = StandIn(short, short, linear_and(**{kept: NOISE}, stribeck=NOISE))
+    assert chosen(fits)[0] == kept
+    assert "stribeck" not in fits.screens
