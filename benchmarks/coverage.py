@@ -29,6 +29,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
+from scipy.interpolate import CubicSpline
 from scipy.stats import binomtest
 
 import rig
@@ -206,6 +207,7 @@ def told(mode: NonlinearMode, name: str) -> Float:
 def add_modal_truth(exact: VirtualRig, points: Sequence[Measured], at: str) -> None:
     """Add modal frequency and damping by harmonic balance, at the true amplitude or at the measured force of each point.
 
+    Between nine amplitudes of a level by a cubic spline: straight lines were off by 2e-6 of the magnet beam's frequency.
     A point that has no true force of its own gets that of phase resonance.
     """
     near_hz = float(np.median([point.estimate["modal_frequency_hz"] for point in points]))
@@ -221,7 +223,7 @@ def add_modal_truth(exact: VirtualRig, points: Sequence[Measured], at: str) -> N
         )
         for one, value in zip(some, where, strict=True):
             for name in (*MODAL, *(() if np.isfinite(one.truth["force_n"]) else ("force_n",))):
-                one.truth[name] = float(np.interp(np.log(value), grid, getattr(found, name)))
+                one.truth[name] = float(CubicSpline(grid, getattr(found, name))(np.log(value)))
 
 
 def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:

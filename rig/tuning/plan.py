@@ -50,16 +50,17 @@ def plan_text(
         else _line("levels_m", list(levels.levels_m)),
     ]
     lost_periods = max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))
+    ramp = ramp_periods(plant, chosen.tracking_periods)
     if not volts:
         head += [
-            "# Voltage of the lowest level on the linear plant, or less: a structure still at rest takes more force.",
-            _line("start_v", significant(start_voltage(bench, plant, levels.needed_v[0]), 4)),
+            "# Voltage of the lowest level on the linear plant, or less: on the way there a structure takes more force.",
+            _line("start_v", significant(start_voltage(bench, plant, levels.needed_v[0], ramp), 4)),
             "# Until vibration and frequency have come to rest there.",
             _line("start_periods", start_periods(plant, chosen.tracking_periods)),
         ]
     head += [
         "# Slow enough that force and frequency follow with the damping as measured.",
-        _line("ramp_periods", ramp_periods(plant, chosen.tracking_periods)),
+        _line("ramp_periods", ramp),
         "# A level that loses the lock is left out, and those above it.",
         _line("on_lost_lock", "skip"),
     ]

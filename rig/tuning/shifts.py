@@ -14,7 +14,8 @@ SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a 
 MIN_PROMINENCE = 3.0  # of a mode's peak over the lowest response between it and the tested mode
 RAMP_TIME_CONSTANTS = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
 MIN_RAMP, MAX_RAMP = 20.0, 300.0  # ramps, periods
-START_SHARE = 0.5  # of the force limit, for a structure that is still at rest
+START_SHARE = 0.5  # of the force limit, on the way to the start voltage
+START_REACH = 0.03  # distance from resonance at which a run may begin, relative: tunings were off by up to 1 %
 MIN_START, MAX_START = 40.0, 600.0  # periods
 PLAUSIBLE_SHIFT = 0.005  # change of the frequency from level to level
 
@@ -92,14 +93,20 @@ def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
     return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), MIN_RAMP), MAX_RAMP))
 
 
-def start_voltage(bench: Bench, plant: PlantModel, needed_v: float) -> float:
+def start_voltage(bench: Bench, plant: PlantModel, needed_v: float, ramp_periods: float) -> float:
     """Return the voltage (V peak) that sets the rig in motion: ``needed_v``, that of the lowest level, or less.
 
-    At resonance a lightly damped structure takes a small part of the force that the same voltage gives while it is still at
-    rest, u / alpha. That force may reach half of the bench's limit.
+    The force on the way there may reach half of the bench's limit. At resonance a lightly damped structure takes a small part of
+    the force that the same voltage gives while it is at rest, u / alpha: a hundredth, which a sensor may not read. A ramp of T
+    lets it move along. Then the force is that of the steady vibration, near resonance, and ``tau / T`` of that at rest, with
+    the time constant tau of the coupled pole.
     """
-    alpha = abs(complex(plant.exciter(1j * plant.lock_frequency_rad_s())[0]))
-    return min(needed_v, START_SHARE * bench.limits.force_n * alpha)
+    resonance = plant.lock_frequency_rad_s()
+    at_rest = 1.0 / abs(complex(plant.exciter(1j * resonance)[0]))
+    near = resonance * np.linspace(1.0 - START_REACH, 1.0 + START_REACH, 61)
+    behind = resonance / (-2.0 * math.pi * plant.coupled_pole_rad_s.real) / ramp_periods
+    moving = float(np.max(np.abs(plant.force_per_v(1j * near)))) + behind * at_rest
+    return min(needed_v, START_SHARE * bench.limits.force_n / min(at_rest, moving))
 
 
 def start_periods(plant: PlantModel, tracking_periods: float) -> float:

@@ -63,10 +63,36 @@ def test_ramps_are_longer_with_little_damping_and_with_slow_loops():
     assert 20.0 <= usual <= 300.0
 
 
+def with_force_limit(force_n):
+    bench = load_bench("magnet-beam")
+    return bench.model_copy(update={"limits": bench.limits.model_copy(update={"force_n": force_n})})
+
+
 def test_the_rig_is_set_in_motion_by_a_voltage_whose_force_at_rest_is_half_of_the_limit_at_most():
     plant, bench = plant_of("magnet-beam"), load_bench("magnet-beam")
-    assert start_voltage(bench, plant, 0.1) == 0.1
-    small = bench.model_copy(update={"limits": bench.limits.model_copy(update={"force_n": 0.01})})
+    assert start_voltage(bench, plant, 0.1, 40.0) == 0.1
     omega = plant.lock_frequency_rad_s()
     blocked = dataclasses.replace(plant, drive_shape=1e-6 * plant.drive_shape, residual_per_kg=(0.0, 0.0))
-    assert abs(blocked.force_per_v(1j * omega)) * start_voltage(small, plant, 0.1) == pytest.approx(0.005, rel=1e-3)
+    at_rest = abs(blocked.force_per_v(1j * omega))
+    assert at_rest * start_voltage(with_force_limit(0.01), plant, 0.1, 1e-3) == pytest.approx(0.005, rel=1e-3)
+
+
+@pytest.mark.parametrize("ramp", [20.0, 100.0])
+def test_a_light_structure_begins_with_more_since_it_moves_along(ramp):
+    """The force over a ramp of the voltage near resonance, by the Fourier transform of the ramp times the response."""
+    plant = dataclasses.replace(plant_of("magnet-beam"), residual_per_kg=(0.0, 0.0))
+    plant = dataclasses.replace(plant, drive_shape=4.0 * plant.drive_shape)
+    omega = plant.lock_frequency_rad_s()
+    start = start_voltage(with_force_limit(0.01), plant, 1.0, ramp)
+    assert start > 2.0 * start_voltage(with_force_limit(0.01), plant, 1.0, 1e-3)
+    n, period = 1 << 15, 2.0 * np.pi / omega
+    times = np.arange(n) * period / 32.0
+    rate = 2.0 * np.pi * np.fft.rfftfreq(n, period / 32.0)
+    inside = (rate > 0.5 * omega) & (rate < 2.0 * omega)
+    for off in (0.97, 1.0, 1.03):
+        volts = start * np.minimum(times / (ramp * period), 1.0) * np.sin(off * omega * times)
+        volts[n // 2 :] *= np.linspace(1.0, 0.0, n - n // 2)
+        response = np.zeros(rate.size, complex)
+        response[inside] = plant.force_per_v(1j * rate[inside])
+        force = np.fft.irfft(np.fft.rfft(volts) * response, n)
+        assert np.max(np.abs(force[: n // 2])) < 0.005
