@@ -149,12 +149,14 @@ def true_vibrations(
 
 
 def run_once(plan: Any, bench: Bench, exact: VirtualRig, seed: int, at: str) -> list[Measured]:
-    """Run a plan, identify it, and return every point with the truth of force and amplitude, where there is one.
+    """Run a plan, identify it, and return every accepted point with the truth of force and amplitude, where there is one.
 
     ``at``: amplitude, or force for intervals of modal frequency and damping at the measured force.
     """
     with rig.run(plan, bench=bench, seed=seed) as done:
         points = resonances(done.recording)
+        if not points:
+            return []
         numbers = [point.number for point in points]
         if settled(plan):
             mode = nonlinear_mode(backbone(done.recording))

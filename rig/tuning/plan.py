@@ -12,7 +12,7 @@ from rig.tuning.design import Chosen, gains_of
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
 from rig.tuning.plant import ChannelRatios
-from rig.tuning.shifts import Window, ramp_periods, start_periods, start_voltage
+from rig.tuning.shifts import Window, ramp_periods, readable_start_ramp, start_periods, start_voltage
 
 HARMONICS = 5  # harmonics that are evaluated; chosen
 AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
@@ -52,6 +52,7 @@ def plan_text(
     lost_periods = max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))
     ramp = ramp_periods(plant, chosen.tracking_periods)
     if not volts:
+        ramp = max(ramp, 5.0 * math.ceil(readable_start_ramp(bench, plant, levels.needed_v[0]) / 5.0))
         head += [
             "# Voltage of the lowest level on the linear plant, or less: on the way there a structure takes more force.",
             _line("start_v", significant(start_voltage(bench, plant, levels.needed_v[0], ramp), 4)),

@@ -8,6 +8,7 @@ import numpy as np
 from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
+from rig.tick.tick import SMALLEST_BITS
 from vibrolock.arrays import Float
 
 SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a test allows for
@@ -16,6 +17,7 @@ RAMP_TIME_CONSTANTS = 1.5  # length of a ramp, in times 1/(D w_0) in which a fre
 MIN_RAMP, MAX_RAMP = 20.0, 300.0  # ramps, periods
 START_SHARE = 0.5  # of the force limit, on the way to the start voltage
 START_REACH = 0.03  # distance from resonance at which a run may begin, relative: tunings were off by up to 1 %
+READABLE = 5.0  # force at the start over the least whose phase is read (0.4 bits): rounding disturbs fewer bits; chosen
 MIN_START, MAX_START = 40.0, 600.0  # periods
 PLAUSIBLE_SHIFT = 0.005  # change of the frequency from level to level
 
@@ -101,12 +103,28 @@ def start_voltage(bench: Bench, plant: PlantModel, needed_v: float, ramp_periods
     lets it move along. Then the force is that of the steady vibration, near resonance, and ``tau / T`` of that at rest, with
     the time constant tau of the coupled pole.
     """
+    at_rest, near, behind = _starting_forces(plant)
+    return min(needed_v, START_SHARE * bench.limits.force_n / min(at_rest, near + behind / ramp_periods))
+
+
+def readable_start_ramp(bench: Bench, plant: PlantModel, needed_v: float) -> float:
+    """Return the least length of a ramp, periods, with which `start_voltage` gives a force that can be read; at most 300."""
+    force = bench.channels[bench.index_of("force")]
+    readable_v = min(needed_v, READABLE * SMALLEST_BITS * force.resolution_in_unit * plant.volts_per_newton())
+    at_rest, near, behind = _starting_forces(plant)
+    allowed = START_SHARE * bench.limits.force_n / readable_v
+    if at_rest <= allowed:
+        return 0.0
+    return MAX_RAMP if allowed <= near else min(behind / (allowed - near), MAX_RAMP)
+
+
+def _starting_forces(plant: PlantModel) -> tuple[float, float, float]:
+    """Force per volt (N/V) at rest, largest near resonance, and in a ramp of one period."""
     resonance = plant.lock_frequency_rad_s()
     at_rest = 1.0 / abs(complex(plant.exciter(1j * resonance)[0]))
     near = resonance * np.linspace(1.0 - START_REACH, 1.0 + START_REACH, 61)
-    behind = resonance / (-2.0 * math.pi * plant.coupled_pole_rad_s.real) / ramp_periods
-    moving = float(np.max(np.abs(plant.force_per_v(1j * near)))) + behind * at_rest
-    return min(needed_v, START_SHARE * bench.limits.force_n / min(at_rest, moving))
+    time_constant = resonance / (-2.0 * math.pi * plant.coupled_pole_rad_s.real)
+    return at_rest, float(np.max(np.abs(plant.force_per_v(1j * near)))), time_constant * at_rest
 
 
 def start_periods(plant: PlantModel, tracking_periods: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.bench import load_bench
-from rig.tuning.shifts import frequency_window, other_modes, ramp_periods, start_voltage
+from rig.tuning.shifts import frequency_window, other_modes, ramp_periods, readable_start_ramp, start_voltage
 from tests.controller.tuning.rigs import plant_of
 
 HERTZ = 24.37
@@ -96,3 +96,17 @@ def test_a_light_structure_begins_with_more_since_it_moves_along(ramp):
         response[inside] = plant.force_per_v(1j * rate[inside])
         force = np.fft.irfft(np.fft.rfft(volts) * response, n)
         assert np.max(np.abs(force[: n // 2])) < 0.005
+
+
+def test_where_the_force_of_a_start_could_not_be_read_ramps_are_longer():
+    """A force sensor of 2 mN per bit, of which two are wanted, beside a limit of 0.1 N."""
+    plant = dataclasses.replace(plant_of("magnet-beam"), drive_shape=4.0 * plant_of("magnet-beam").drive_shape)
+    bench = with_force_limit(0.1)
+    assert readable_start_ramp(with_force_limit(10.0), plant, 1.0) == 0.0
+    force = bench.channels[bench.index_of("force")]
+    coarse = force.model_copy(update={"resolution_v": 0.002 * force.resolution_v / force.resolution_in_unit})
+    channels = tuple(coarse if one.name == force.name else one for one in bench.channels)
+    bench = bench.model_copy(update={"channels": channels})
+    ramp = readable_start_ramp(bench, plant, 1.0)
+    assert 20.0 < ramp < 300.0
+    assert start_voltage(bench, plant, 1.0, ramp) == pytest.approx(2.0 * 0.002 * plant.volts_per_newton())
