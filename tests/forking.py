@@ -120,11 +120,11 @@ def _fork(process: Any, told: Mapping[str, Any]) -> bool:
     ours = [told["p2cread"], told["c2pwrite"], told["errwrite"]]
     streams = [number if fd == -1 else fd for number, fd in enumerate(ours)]
     try:
-        folder = os.path.abspath(told["cwd"] or os.getcwd())  # noqa: PTH100, PTH109
-        order = pickle.dumps((told["args"][1:], wanted, folder, told["start_new_session"], [0, 1, 2, *passed]))
+        folder = Path(told["cwd"] or "").absolute()
+        order = pickle.dumps((told["args"][1:], wanted, str(folder), told["start_new_session"], [0, 1, 2, *passed]))
     except (OSError, TypeError):
         return False
-    if len(order) > MOST_BYTES or not os.path.isdir(folder):  # noqa: PTH112
+    if len(order) > MOST_BYTES or not folder.is_dir():
         return False
     with _one_at_a_time, _adopting():
         socket.send_fds(server, [order], [*streams, *passed])

@@ -13,6 +13,7 @@ import socket
 import sys
 import threading
 import traceback
+from pathlib import Path
 from typing import Any, NoReturn
 
 LOADED = tuple(
@@ -73,7 +74,7 @@ def become(
         os.environ.update(environment)
         is_safe = words[0] == "-P"
         option, what, *arguments = words[1:] if is_safe else words
-        given = [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100
+        given = [str(Path(path).absolute()) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]
         first = [] if is_safe else ["" if option == "-c" else folder]
         sys.path[:] = [*first, *dict.fromkeys([*given, *here])]
         sys.orig_argv[1:] = words
@@ -92,13 +93,13 @@ def _take(descriptors: list[int], numbers: list[int]) -> None:
     high = [fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, HIGH) for one in descriptors]
     for one, number in zip(high, numbers, strict=True):
         os.dup2(one, number, inheritable=True)
-    for name in os.listdir("/proc/self/fd"):  # noqa: PTH208
-        if int(name) not in numbers:
+    for number in [int(path.name) for path in Path("/proc/self/fd").iterdir()]:
+        if number not in numbers:
             with contextlib.suppress(OSError):
-                os.close(int(name))
+                os.close(number)
     for name, number, mode, errors in (("stdin", 0, "r", "strict"), ("stdout", 1, "w", "strict")):
-        setattr(sys, name, open(number, mode, errors=errors, closefd=False))  # noqa: SIM115
-    sys.stderr = open(2, "w", errors="backslashreplace", buffering=1, closefd=False)  # noqa: SIM115
+        setattr(sys, name, os.fdopen(number, mode, errors=errors, closefd=False))
+    sys.stderr = os.fdopen(2, "w", errors="backslashreplace", buffering=1, closefd=False)
     sys.__stdin__, sys.__stdout__, sys.__stderr__ = sys.stdin, sys.stdout, sys.stderr
 
 

@@ -98,9 +98,9 @@ def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
 def start_voltage(bench: Bench, plant: PlantModel, needed_v: float, ramp_periods: float) -> float:
     """Return the voltage (V peak) that sets the rig in motion: ``needed_v``, that of the lowest level, or less.
 
-    The force on the way there may reach half of the bench's limit. At resonance a lightly damped structure takes a small part of
-    the force that the same voltage gives while it is at rest, u / alpha: a hundredth, which a sensor may not read. A ramp of T
-    lets it move along. Then the force is that of the steady vibration, near resonance, and ``tau / T`` of that at rest, with
+    The force on the way there may reach half of the bench's limit. At resonance a lightly damped structure takes a small part
+    of the force that the same voltage gives while it is at rest, u / alpha: a hundredth, which a sensor may not read. A ramp of
+    T lets it move along. Then the force is that of the steady vibration, near resonance, and ``tau / T`` of that at rest, with
     the time constant tau of the coupled pole.
     """
     at_rest, near, behind = _starting_forces(plant)

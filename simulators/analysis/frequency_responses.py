@@ -40,6 +40,13 @@ class FrequencyResponses:
         return {at: -(omega**2) * receptance for at, receptance in self.receptance_m_per_n.items()}
 
 
+def check_below_half(frequencies_hz: Float, rate_hz: float) -> None:
+    """Raise `ValueError` if a frequency is not below half the sample rate."""
+    if np.max(frequencies_hz) >= 0.5 * rate_hz:
+        allowed = f"below {0.5 * rate_hz:g}, half the sample rate"
+        raise InputError(field="frequencies_hz", value=np.max(frequencies_hz), allowed=allowed)
+
+
 def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool = False) -> FrequencyResponses:
     """Return the linear frequency responses at some frequencies.
 
@@ -58,9 +65,8 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
     """
     frequencies = positive("frequencies_hz", frequencies_hz)
     plant, points, rate_hz = rig.plant, rig.structure.points, rig.converter.sample_rate_hz
-    if held and np.max(frequencies) >= 0.5 * rate_hz:
-        allowed = f"below {0.5 * rate_hz:g}, half the sample rate"
-        raise InputError(field="frequencies_hz", value=np.max(frequencies), allowed=allowed)
+    if held:
+        check_below_half(frequencies, rate_hz)
     s = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
     if held:  # (e^{sT} - e^{AT})^-1 Gamma: state at the sample instants
         phi = phi_matrices(plant.dynamics, plant.voltage_column[:, None], 1.0 / rate_hz)

@@ -15,12 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simulators.analysis.frequency_responses import frequency_response
+from simulators.analysis.frequency_responses import check_below_half, frequency_response
 from simulators.plant.compilation import phi_matrices
 from simulators.sensing.filters import channel_sections
 from simulators.virtual_rig import VirtualRig
 from vibrolock.arrays import Complex, Float
-from vibrolock.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -82,9 +81,7 @@ def image_shares(rig: VirtualRig, frequencies_hz: ArrayLike) -> dict[str, Comple
     """
     converter, true = rig.converter, frequency_response(rig, frequencies_hz)
     rate_hz, count, step_s = converter.sample_rate_hz, converter.oversampling, 1.0 / converter.internal_rate_hz
-    if np.max(true.frequency_hz) >= 0.5 * rate_hz:
-        allowed = f"below {0.5 * rate_hz:g}, half the sample rate"
-        raise InputError(field="frequencies_hz", value=np.max(true.frequency_hz), allowed=allowed)
+    check_below_half(true.frequency_hz, rate_hz)
     s = 2j * np.pi * (true.frequency_hz[:, None] + rate_hz * np.arange(count))
     turned = np.exp(-s[:, :, None] * step_s * np.arange(count)) / count
     hold = -np.expm1(-s[:, 0] / rate_hz) / s[:, 0] * rate_hz

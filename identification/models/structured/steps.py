@@ -161,9 +161,7 @@ def evaluate(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, e: i
 
 
 @inner_kernel
-def joint_step(
-    tables: Tables, e: int, s: int, r: float, way: float, to_rest: float
-) -> tuple[float, float, float]:
+def joint_step(tables: Tables, e: int, s: int, r: float, way: float, to_rest: float) -> tuple[float, float, float]:
     """Move a slider of an element as `slider_step` does; after the way ``to_rest`` a step ends at rest."""
     if tables.bent[e]:
         return slider_step(before(r, tables.bends[s], to_rest), tables.sliders[s], tables.bends[s], way)
@@ -182,7 +180,7 @@ def is_dry(tables: Tables, e: int) -> bool:
 
 @inner_kernel
 def up_to_steps(w: float, change: float, to_rest: float) -> float:
-    """Return the change of a rate as far as the next step of dry friction: at no rate, or at that with which it comes to rest."""
+    """Return the change of a rate up to the next step of dry friction: at no rate, or at that with which it comes to rest."""
     for at in (0.0, to_rest):
         if (w - at) * (w + change - at) < 0.0:
             change = at - w
