@@ -64,7 +64,8 @@ class LifeCycleTests(DriverUnderTest):
 
     def test_close_leaves_nothing_behind(self) -> None:
         """Neither a thread nor an open file is more after every cycle."""
-        kept, threads, files = [], [], []
+        kept, threads = [], []
+        files: list[set[str]] = []
         for cycle in range(CYCLES):
             before, opened = set(threading.enumerate()), _open_files()
             kept.append(self.make())

@@ -185,14 +185,15 @@ class ElementFits:
     ) -> list[Start]:
         with threads():  # the matrices are too small to share
             if model.elements or between:
-                found = with_further_element(model, self._experiments, self._nudged, laws, between, self._reach, held)
-                return [found]
+                return [self._further(model, laws, between, held)]
             found = element_starts(model, self._experiments, self._nudged, laws, self._reach, held)
             if any(isinstance(law, Joint) and not law.sticks for law in laws):
                 # that force jumps where the element turns, which is not where a mode does: a direction comes first
-                further = with_further_element(model, self._experiments, self._nudged, laws, (), self._reach, held)
-                return [further._replace(residual=found[0].residual), *found]
+                return [self._further(model, laws, (), held)._replace(residual=found[0].residual), *found]
             return found
+
+    def _further(self, model: StructuredModel, laws: Sequence[Law], between: tuple[str, ...], held: int) -> Start:
+        return with_further_element(model, self._experiments, self._nudged, laws, between, self._reach, held)
 
     def _from(self, start: StructuredModel) -> Fitted:
         return _fitted(start, self._linear, self._modes, self._experiments, self._nudged, self._support, self._watch)

@@ -1,4 +1,4 @@
-"""Images of the held output in the force of a point, where no anti-alias filter keeps them out.
+"""Images of the held output in the force of a point, where the anti-alias filter, if any, does not keep them out.
 
 A driver that knows them says which error of the force they are, by resonance and per volt (`rig.daq.Image`). It hardly depends
 on the level. The force at phase resonance goes with the damping, so that the error of the damping is that of the part of the

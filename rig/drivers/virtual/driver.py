@@ -192,7 +192,7 @@ class VirtualDAQ(DAQ):
 
     @property
     def images(self) -> tuple[Image, ...]:
-        """Images of the held output in the force, of every linear mode that is sampled, where no filter keeps them out."""
+        """Images of the held output in the force, of every linear mode that is sampled, past the filters."""
         parts = ((hz, bias.force_n_per_v) for hz, bias in self._image_biases.items())
         return tuple(Image(hz, part.real, part.imag) for hz, part in parts)
 
