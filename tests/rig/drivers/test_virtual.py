@@ -69,14 +69,26 @@ def test_slow_bench_without_filters_reads_it_wrong_and_says_by_how_much() -> Non
         assert refusal is not None
         assert float(refusal[1]) == pytest.approx(100.0 * share, rel=0.02)
     assert all(point["quality"] in ("good", "warned") for point in right)
-    assert "images" not in of_filtered
+    assert of_filtered["images"] == [[*image] for image in make_daq(bench_with()).images]
     assert of_unfiltered["images"] == [[*image] for image in make_daq(bench).images]
 
 
-def test_images_of_every_linear_mode_are_known_without_filters_alone() -> None:
-    assert make_daq(bench_with()).images == make_daq(slow_bench(**SLOW_AND_FILTERED)).images == ()
-    images = make_daq(slow_bench(substeps=20)).images
-    assert [image.frequency_hz for image in images] == pytest.approx([24.37, 134.06, 380.94], abs=0.01)
+def test_a_filter_that_lets_images_pass_changes_the_damping_by_what_is_said_of_it() -> None:
+    bench = slow_bench(**SLOW_AND_FILTERED, anti_alias_order=2)
+    (remark,) = make_daq(bench).remarks
+    said = re.search(
+        r"change the damping ratio of the linear mode by (-[.\d]+) % .* pass the anti-alias filter at 320 Hz", remark
+    )
+    assert said is not None
+    change = last_damping(bench)[0] / last_damping(bench_with())[0] - 1.0
+    assert 100.0 * change == pytest.approx(float(said[1]), rel=0.1)
+
+
+def test_images_of_every_linear_mode_are_known_and_filters_leave_little_of_them() -> None:
+    open_, filtered = (make_daq(slow_bench(**one)).images for one in ({"substeps": 20}, SLOW_AND_FILTERED))
+    assert [image.frequency_hz for image in open_] == pytest.approx([24.37, 134.06, 380.94], abs=0.01)
+    for one, other in zip(open_[:2], filtered[:2], strict=True):
+        assert abs(other.in_phase_n_per_v) < 0.1 * abs(one.in_phase_n_per_v)
 
 
 def test_shares_of_images_are_those_of_the_rig_with_its_filters_and_none_behind_a_filter_of_the_output() -> None:
