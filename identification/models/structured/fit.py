@@ -131,7 +131,7 @@ def fit_structured(
     laws
         Laws of the element (`laws`): what they declare as linear and as tried gets initial values
         from the data. ``"auto"``: they are chosen by the validation data
-        (`identification.models.structured.law_choice.choose_law`), in two to three times the time of one fit; the result may
+        (`identification.models.structured.law_choice.choose_law`), in two to four times the time of one fit; the result may
         have no element. `trials` of the result has all that was tried.
     between
         Outputs between which, or at which, the element with ``laws`` acts, as in `ElementPlan`; empty: it is found.
