@@ -196,5 +196,8 @@ def _left_open(before: set[str], wait_s: float) -> set[str]:
 
 
 def _open_files() -> set[str]:
-    """Numbers of the open file descriptors; none where the system does not list them."""
-    return {path.name for path in DESCRIPTORS.iterdir()} if DESCRIPTORS.is_dir() else set()
+    """Numbers of the open file descriptors; none where the system does not list them.
+
+    The list has its own descriptor, which is closed when it is looked at again, and not always the same.
+    """
+    return {path.name for path in DESCRIPTORS.iterdir() if path.is_symlink()} if DESCRIPTORS.is_dir() else set()
