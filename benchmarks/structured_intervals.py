@@ -34,8 +34,8 @@ QUANTITIES = (
 RUNS = ((2.0, 1), (6.0, 2), (6.0, 3))
 """RMS (N) and seed of the phases of each multisine."""
 truth.FINE = 256
-"""Steps of the truth in a sample. With the 64 of the tests the leapfrog rule raises frequency 2 by 1.2e-6 of itself, which is more
-than its standard error."""
+"""Steps of the truth in a sample. With the 64 of the tests the leapfrog rule raises frequency 2 by 1.2e-6 of itself, which is
+more than its standard error."""
 STARTED = 1000
 """Samples from rest to the first period of unsettled data."""
 
