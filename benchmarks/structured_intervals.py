@@ -33,9 +33,9 @@ QUANTITIES = (
 )
 RUNS = ((2.0, 1), (6.0, 2), (6.0, 3))
 """RMS (N) and seed of the phases of each multisine."""
-truth.FINE = 256
-"""Steps of the truth in a sample. With the 64 of the tests the leapfrog rule raises frequency 2 by 1.2e-6 of itself, which is
-more than its standard error."""
+STEPS = 256
+"""Of the truth in a sample. With the 64 of the tests the leapfrog rule raises frequency 2 by 1.2e-6 of itself, which is more
+than its standard error."""
 STARTED = 1000
 """Samples from rest to the first period of unsettled data."""
 
@@ -65,7 +65,7 @@ def of_truth(model: StructuredModel) -> Float:
 def two_periods(rms_n: float, phases: int, unsettled: bool) -> Experiment:
     """Two periods that count, without noise, and one ahead."""
     settled, size = truth.experiment(rms_n, phases), truth.PERIOD
-    outputs = truth.periods(rms_n, phases).reshape(len(settled.outputs), -1)
+    outputs = truth.periods(rms_n, phases, STEPS).reshape(len(settled.outputs), -1)
     start = STARTED if unsettled else outputs.shape[1] - 2 * size
     outputs = outputs[:, start : start + 2 * size]
     inputs = np.roll(settled.inputs[:, :size], -start, axis=1)

@@ -42,7 +42,9 @@ def _own_name() -> Iterator[str]:
     while time.monotonic() < until:
         for number in range(NAMES):
             name = f"vibrolock-test-{number}"
-            with (folder / f"{name}-{os.getuid()}.lock").open("w") as lock, suppress(BlockingIOError):
+            path = folder / f"{name}-{os.getuid()}.lock"
+            held = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)  # a folder that others write to
+            with os.fdopen(held) as lock, suppress(BlockingIOError):
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 yield name
                 return

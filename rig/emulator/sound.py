@@ -13,11 +13,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -221,37 +222,37 @@ def _server(jack: Any) -> Iterator[None]:
     if program is None:
         raise DaqRefused("the program jackd is not installed; on Debian: apt install jackd2")
     command = [program, *_scheduling(), "-S", "-d", "dummy", "-r", str(RATE_HZ), "-p", str(PERIOD)]
-    with tempfile.TemporaryFile() as said:
-        server = subprocess.Popen(
-            command,
-            stdout=subprocess.DEVNULL,
-            stderr=said,
-            start_new_session=True,
-            preexec_fn=_end_with_parent if sys.platform == "linux" else None,
-        )
+    server = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+        preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+    )
+    assert server.stderr is not None
+    last_lines: deque[str] = deque(maxlen=3)
+    reading = threading.Thread(target=last_lines.extend, args=(server.stderr,), daemon=True)
+    reading.start()
+    try:
+        until = time.monotonic() + START_S
+        while not _answers(jack):
+            if server.poll() is not None:
+                reading.join(START_S)
+                said = "; ".join(line.strip() for line in last_lines)
+                raise DaqError(f"{' '.join(command)}: the server has ended: {said}")
+            if time.monotonic() > until:
+                raise DaqError(f"{' '.join(command)}: the server has not begun to answer within {START_S:g} s")
+            time.sleep(0.05)
+        yield
+    finally:
+        server.send_signal(signal.SIGTERM)
         try:
-            until = time.monotonic() + START_S
-            while not _answers(jack):
-                ended = server.poll() is not None
-                if ended or time.monotonic() > until:
-                    what = "has ended" if ended else f"has not begun to answer within {START_S:g} s"
-                    raise DaqError(f"{' '.join(command)}: the server {what}{_last_lines(said)}")
-                time.sleep(0.05)
-            yield
-        finally:
-            server.send_signal(signal.SIGTERM)
-            try:
-                server.wait(START_S)
-            except subprocess.TimeoutExpired:
-                server.kill()
-                server.wait()
-
-
-def _last_lines(said: IO[bytes]) -> str:
-    """What a server has said of its end, on one line."""
-    said.seek(0)
-    lines = said.read().decode(errors="replace").splitlines()
-    return "".join(f"; {line.strip()}" for line in lines[-3:] if line.strip())
+            server.wait(START_S)
+        except subprocess.TimeoutExpired:
+            server.kill()
+            server.wait()
 
 
 def _end_with_parent() -> None:

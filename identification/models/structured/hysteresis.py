@@ -11,12 +11,13 @@ force a piece ends, after a way that is Gauss' quadrature of ``1/g``. The work i
 a step belongs to the change of the state. ``g`` is larger below zero (unloading) than above (loading) at the same ``|w|``, so
 that the work is never less than the rise of the energy ``integral of r dr/(k g(-|r|/y))`` that unloading gives back.
 
-Dry friction has no memory. It brings a step to rest at its end where it can, that is after half of the way at the speed at
-its beginning: a step without way would end at the opposite speed, and so on. Within its largest force it is ``k`` times the
-way beyond that, with a k so large that this is hardly moved. It is zero between that way and none, and along a way back it is
-a force the other way, so that its work is never negative. By Stribeck's law it falls from the largest force at rest with the
-way of a step, that is with the speed, as ``y + (largest - y) exp(-(way/gamma)^2)``, with the way gamma of a step at
-Stribeck's speed.
+Dry friction has no memory. Where it is large enough it brings the structure to rest at the end of a step. By the midpoint rule
+the way of that step, ``to_rest``, is half of what the speed at its beginning would give. (After a step without any way the
+speed would be the opposite one, and so it would go on.) Beyond that way the force is ``k`` times the rest of the way, up to
+the largest force, with a k so large that a structure that is held hardly moves. Along a shorter way the force is zero, and
+along a way back it opposes that one, so that its work is never negative. By Stribeck's law the force falls from its largest
+value, at rest, with the way of a step, that is with the speed, as ``y + (largest - y) exp(-(way/gamma)^2)``, with the way gamma
+of a step at Stribeck's speed.
 
 A row of `Tables.bends` is ``[y, n, gamma]``; n is 0 for a Jenkins slider and below zero for dry friction, with gamma 0 where it
 does not depend on the speed.
@@ -106,8 +107,8 @@ def dry_friction(at_rest: float, sliding: float, scale: float, speed: float) -> 
 
 
 @kernel
-def before(r: float, bend: np.ndarray, to_rest: float) -> float:
-    """Return what a step of a hysteresis or a slider begins with: its force ``r``; dry friction with its way to rest."""
+def memory_of(r: float, bend: np.ndarray, to_rest: float) -> float:
+    """Return what a step depends on beside its way: the force ``r`` at its beginning; for dry friction the way to rest."""
     return to_rest if bend[1] < 0.0 else r
 
 
@@ -130,7 +131,7 @@ def dry_step(size: float, by_size: float, k: float, way: float, to_rest: float) 
 def hysteresis_step(
     r: float, k: float, largest: float, y: float, n: float, gamma: float, way: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Move a hysteresis with the force ``r`` (dry friction: with ``r`` as its way to rest, `before`) along ``way``.
+    """Move a hysteresis with the force ``r`` along ``way``. For dry friction ``r`` is its way to rest (`memory_of`).
 
     Return mean force, force at the end, the derivatives of the mean by ``way`` and by ``r``, and those of the end. They follow
     from the equation, which knows x by its differential only: ``d w/d w0 = g(w)/g(w0)``.
@@ -158,7 +159,7 @@ def hysteresis_step(
 def slider_step(r: float, slider: np.ndarray, bend: np.ndarray, way: float) -> tuple[float, float, float]:
     """Move a slider or a hysteresis; return mean force, force at the end, and the derivative of the mean by ``way``.
 
-    ``r`` is that of `before`.
+    ``r`` is that of `memory_of`.
     """
     if bend[1] == 0.0:
         mean, end, by_way, _ = jenkins_step(r, slider[0], slider[1], way)
@@ -196,7 +197,7 @@ def joint_forces(sliders: np.ndarray, bends: np.ndarray, x: np.ndarray, out: np.
         r, last = 0.0, x[x.size - 1]
         for repeat in range(2):
             for k in range(x.size):
-                r = slider_step(before(r, bends[s], 0.0), sliders[s], bends[s], x[k] - last)[1]
+                r = slider_step(memory_of(r, bends[s], 0.0), sliders[s], bends[s], x[k] - last)[1]
                 last = x[k]
                 if repeat == 1:
                     out[k] += r

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.models.structured.elements import DerivativeTables
-from identification.models.structured.hysteresis import before, hysteresis_by, hysteresis_step
+from identification.models.structured.hysteresis import hysteresis_by, hysteresis_step, memory_of
 from identification.models.structured.kernels import damping_at, jenkins_step, mean_spring, spring_at
 from identification.models.structured.steps import (
     System,
@@ -232,7 +232,7 @@ def of_slips(system: System, work: Workspace, e: int, derivatives: Sensitivities
 
 @inner_kernel
 def of_hystereses(system: System, work: Workspace, e: int, state: np.ndarray, derivatives: Sensitivities) -> None:
-    """Add what an element's hystereses begin a step with changes of their mean forces to ``work.dforce``."""
+    """Add the derivatives of an element's mean forces through what its hystereses begin a step with to ``work.dforce``."""
     n, tables, way = system.omega.size, system.tables, system.step_s * work.w[e]
     to_rest = 0.5 * system.step_s * work.begun[e]
     if not tables.bent[e]:
@@ -242,7 +242,7 @@ def of_hystereses(system: System, work: Workspace, e: int, state: np.ndarray, de
         if bend[1] < 0.0:
             of_rest(system, e, state, derivatives, derivatives.rows[at])
         if bend[1] != 0.0:
-            r = before(state[at], bend, to_rest)
+            r = memory_of(state[at], bend, to_rest)
             by_r = hysteresis_step(r, tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], way)[3]
             add(work.dforce, by_r, derivatives.rows[at])
 
@@ -279,7 +279,10 @@ def add_laws(system: System, work: Workspace, changes: DerivativeTables, e: int,
         for s in range(changes.first[k], changes.last[k]):
             by, share = changes.sliders[k, s], work.stuck[s]
             if tables.bent[e] and tables.bends[s, 1] != 0.0:
-                r, by_bend = before(state[2 * n + 1 + s], tables.bends[s], 0.5 * h * work.begun[e]), changes.bends[k, s]
+                r, by_bend = (
+                    memory_of(state[2 * n + 1 + s], tables.bends[s], 0.5 * h * work.begun[e]),
+                    changes.bends[k, s],
+                )
                 total += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[0]
                 continue
             total += sign * (1.0 - share) * by[1] + 0.5 * share * share * way * by[0]
@@ -308,7 +311,7 @@ def end_sliders(
         for s in range(changes.first[k], changes.last[k]):
             by, own = changes.sliders[k, s], derivatives.rows[2 * n + 1 + s]
             if tables.bent[e] and tables.bends[s, 1] != 0.0:
-                r, by_bend = before(state[2 * n + 1 + s], tables.bends[s], to_rest), changes.bends[k, s]
+                r, by_bend = memory_of(state[2 * n + 1 + s], tables.bends[s], to_rest), changes.bends[k, s]
                 own[column] += hysteresis_by(r, tables.sliders[s], tables.bends[s], by, by_bend, way)[1]
             elif derivatives.sticks[s]:
                 own[column] += way * by[0]
@@ -337,7 +340,7 @@ def end_hystereses(
                     add(work.row, system.phi[e, i], rhs[i])
                     work.row[begin + i] += work.mean[i]
                 ready = True
-            r = before(state[at], bend, 0.5 * h * work.begun[e])
+            r = memory_of(state[at], bend, 0.5 * h * work.begun[e])
             _, _, _, _, by_way, by_r = hysteresis_step(
                 r, tables.sliders[s, 0], tables.sliders[s, 1], bend[0], bend[1], bend[2], h * work.w[e]
             )

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.models.structured.elements import Tables
-from identification.models.structured.hysteresis import before, slider_step
+from identification.models.structured.hysteresis import memory_of, slider_step
 from identification.models.structured.kernels import damping_at, jenkins_step, spring_at, step_force
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
@@ -164,7 +164,7 @@ def evaluate(system: System, work: Workspace, q: np.ndarray, r: np.ndarray, e: i
 def joint_step(tables: Tables, e: int, s: int, r: float, way: float, to_rest: float) -> tuple[float, float, float]:
     """Move a slider of an element as `slider_step` does; after the way ``to_rest`` a step ends at rest."""
     if tables.bent[e]:
-        return slider_step(before(r, tables.bends[s], to_rest), tables.sliders[s], tables.bends[s], way)
+        return slider_step(memory_of(r, tables.bends[s], to_rest), tables.sliders[s], tables.bends[s], way)
     mean, end, by_way, _ = jenkins_step(r, tables.sliders[s, 0], tables.sliders[s, 1], way)
     return mean, end, by_way
 

@@ -108,7 +108,7 @@ def test_a_server_that_does_not_start_says_why(server, monkeypatch, tmp_path):
     program.write_text("#!/bin/sh\necho Too many servers already active >&2\nexit 255\n")
     program.chmod(0o700)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    with pytest.raises(DaqError, match="the server has ended; Too many servers already active"):
+    with pytest.raises(DaqError, match="the server has ended: Too many servers already active"):
         Emulator(bench_with(), "sound", lockstep=False).start()
 
 

@@ -43,23 +43,22 @@ def accelerations(u, h, every, omega, zeta, b, spring, cubic, joint, stiffness, 
     return out
 
 
-def force_of(rms_n: float, seed: int) -> np.ndarray:
+def force_of(rms_n: float, seed: int, fine: int = FINE) -> np.ndarray:
     """A period of a multisine from 10 to 75 Hz, at the steps of the integration."""
-    spectrum = np.zeros(PERIOD * FINE // 2 + 1, complex)
+    spectrum = np.zeros(PERIOD * fine // 2 + 1, complex)
     frequency_hz = np.arange(spectrum.size) * RATE_HZ / PERIOD
     lines = (frequency_hz >= 10.0) & (frequency_hz <= 75.0)
     spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(seed).random(int(lines.sum())))
-    fine = np.fft.irfft(spectrum)
-    return fine * rms_n / np.std(fine)
+    force = np.fft.irfft(spectrum)
+    return force * rms_n / np.std(force)
 
 
-def periods(rms_n: float, seed: int) -> np.ndarray:
+def periods(rms_n: float, seed: int, fine: int = FINE) -> np.ndarray:
     """float[n_outputs, PERIODS, PERIOD]: outputs from rest, without noise."""
-    fine = force_of(rms_n, seed)
     found = accelerations(
-        np.tile(fine, PERIODS),
-        1.0 / RATE_HZ / FINE,
-        FINE,
+        np.tile(force_of(rms_n, seed, fine), PERIODS),
+        1.0 / RATE_HZ / fine,
+        fine,
         OMEGA,
         ZETA,
         INPUT,
