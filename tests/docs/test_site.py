@@ -15,6 +15,7 @@ from typer.main import get_command
 from rig.cli.app import app
 from rig.reference.words import known_words, read_words
 from tests.docs.pages import ROOT
+from tests.sharing import made_once, shared_folder
 
 DOCS = ROOT / "docs"
 pytestmark = [
@@ -47,15 +48,19 @@ class Page(HTMLParser):
             self.loads.add(given["src"])
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """Folder of the site, built once without running the gallery, and the warnings of the build."""
-    folder = tmp_path_factory.mktemp("site")
+def build(folder):
+    """Build the site without running the gallery, and keep the warnings beside it."""
     gallery = ["-D", "plot_gallery=0"] if "sphinx_gallery" in (DOCS / "conf.py").read_text() else []
     command = [sys.executable, "-m", "sphinx", "-q", "-E", "-b", "html", *gallery, "-d", str(folder / "doctrees")]
     command += ["-w", str(folder / "warnings.txt"), str(DOCS), str(folder / "site")]
     out = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert out.returncode == 0, out.stderr
+
+
+@pytest.fixture(scope="module")
+def built():
+    """Folder of the site, and the warnings of its build: one for all workers, since a gallery is written beside its sources."""
+    folder = made_once(shared_folder() / "site", build)
     return folder / "site", (folder / "warnings.txt").read_text(encoding="utf-8").splitlines()
 
 
