@@ -16,6 +16,7 @@ from typing import Any
 import llvmlite.binding
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.registry import cpu_target
 
 from vibrolock.compiling import on_compiling
 from vibrolock.content_digest import content_digest
@@ -35,7 +36,8 @@ def _choose_processor() -> None:
     """Compile for any x86-64 processor with AVX2 (level v3 of the psABI) where this is one, whatever its make.
 
     The code is the same on all of them, to the bit, and quicker than what LLVM makes for the very processor: see decision 0063.
-    ``NUMBA_CPU_NAME`` overrides it.
+    ``NUMBA_CPU_NAME`` overrides it. Where other code has let numba compile before, numba's generator was made for the very
+    processor, and is made anew.
     """
     if os.environ.get("NUMBA_CPU_NAME") or os.environ.get("NUMBA_CPU_FEATURES"):
         return
@@ -43,6 +45,9 @@ def _choose_processor() -> None:
     if platform.machine().lower() in ("x86_64", "amd64") and all(features.get(name, False) for name in LEVEL_3):
         setattr(numba.config, "CPU_NAME", "x86-64-v3")  # noqa: B010 (made at run time, unknown to type checkers)
         setattr(numba.config, "CPU_FEATURES", "")  # noqa: B010
+        context: Any = cpu_target.target_context
+        if context.codegen().magic_tuple()[2]:
+            context.init()
 
 
 _choose_processor()

@@ -1,5 +1,9 @@
 """For which processor kernels are compiled: any with AVX2, unless the environment names another."""
 
+import os
+import subprocess
+import sys
+
 import numba
 import pytest
 
@@ -7,6 +11,18 @@ from vibrolock import content_cache
 
 HAS = dict.fromkeys(content_cache.LEVEL_3, True)
 NAMES = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
+COMPILED_BEFORE = """
+import numba
+from numba.core.registry import cpu_target
+
+one_more = numba.njit(lambda x: x + 1)
+assert one_more(1.0) == 2.0
+own = cpu_target.target_context.codegen().magic_tuple()
+from vibrolock import content_cache
+print(own == cpu_target.target_context.codegen().magic_tuple(), *cpu_target.target_context.codegen().magic_tuple()[1:])
+assert one_more(1) == 2
+assert numba.njit(lambda x: one_more(x) ** 2)(2.0) == 9.0
+"""
 
 
 @pytest.fixture
@@ -44,3 +60,13 @@ def test_another_processor_is_left_to_numba(chosen):
         without = {other: True for other in content_cache.LEVEL_3 if other != name}
         assert chosen({}, features=without) == ("numba's own", "numba's own")
         assert chosen({}, features=without | {name: False}) == ("numba's own", "numba's own")
+
+
+def test_what_has_compiled_before_changes_no_kernel():
+    features = content_cache.llvmlite.binding.get_host_cpu_features()
+    if not all(features.get(name, False) for name in content_cache.LEVEL_3):
+        pytest.skip("numba decides for this processor")
+    cleared = {key: value for key, value in os.environ.items() if key not in NAMES}
+    program = [sys.executable, "-c", COMPILED_BEFORE]
+    done = subprocess.run(program, env=cleared, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "x86-64-v3"]
