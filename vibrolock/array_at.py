@@ -2,12 +2,10 @@
 
 from typing import Any
 
-import numba.np.arrayobj
 from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-_np: Any = numba.np.arrayobj
 _types: Any = types
 
 
@@ -15,8 +13,11 @@ def _array_at(typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
     array = _types.Array(dtype.dtype, shape.count if isinstance(shape, _types.BaseTuple) else 1, "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        from numba.np.arrayobj import np_cfarray  # only compiling needs it
+
+        make: Any = np_cfarray
         place = builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
-        return _np.np_cfarray(context, builder, array(_types.voidptr, shape), (place, arguments[1]))
+        return make(context, builder, array(_types.voidptr, shape), (place, arguments[1]))
 
     return array(address, shape, dtype), generate
 

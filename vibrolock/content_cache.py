@@ -10,13 +10,15 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import llvmlite.binding
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
+from numba.core.sigutils import normalize_signature
 
 from vibrolock.compiling import on_compiling
 from vibrolock.content_digest import content_digest
@@ -80,8 +82,20 @@ def inner_dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> A
 
 
 def c_function(signature: str) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that compiles a C function of a signature at once; its machine code is found by its file."""
-    decorate: Callable[[Callable[..., Any]], Any] = numba.cfunc(signature, cache=True)
+    """Return a decorator that compiles a C function of a signature at once, or loads its machine code like a kernel's.
+
+    The function allocates nothing. ``numba.cfunc`` would first make all of numba's own implementations known, a third of a
+    second, even where it only loads.
+    """
+    normalized: Any = normalize_signature
+    options = {"_nrt": False}  # it allocates nothing; what counts references is not loaded
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        made: Any = CFunc(function, normalized(signature), locals={}, options=options)
+        made._cache = _ContentCache(SimpleNamespace(py_func=function, targetoptions={**options, "cfunc": signature}))
+        made.compile()
+        return made
+
     return decorate
 
 

@@ -255,3 +255,20 @@ def test_of_two_processes_that_miss_a_kernel_one_compiles_it_and_the_other_loads
             assert not compiles
             assert first.communicate("\n")[0] == "1.5\n"
             assert second.communicate("\n")[0] == "1.5\n"
+
+
+def test_a_c_function_is_loaded_without_what_numba_needs_to_compile(tmp_path):
+    (tmp_path / "forces_of_mine.py").write_text(
+        "from vibrolock.content_cache import c_function\n\n"
+        '@c_function("float64(float64, CPointer(float64))")\n'
+        "def spring(x, parameters):\n    return -parameters[0] * x\n"
+    )
+    code = f"""
+import ctypes
+sys.path.insert(0, {str(tmp_path)!r})
+from forces_of_mine import spring
+print(spring.ctypes(2.0, (ctypes.c_double * 1)(3.0)), 'numba.np.arraymath' in sys.modules)
+"""
+    cold = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run(code, **cold) == ["-6.0", "True"]
+    assert run(code, **cold) == ["-6.0", "False"]
