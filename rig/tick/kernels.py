@@ -61,9 +61,11 @@ def phase_on_output(history: np.ndarray, seen: int, delay_fraction: float, dt: f
 def lag_of_channels(loop: Record, omega: float) -> float:
     """Return the phase (rad) by which the force channel lags behind the drive channel: by its delay, and by the high-passes.
 
-    A first-order high-pass of corner w_c leads by atan(w_c / omega).
+    A first-order high-pass of corner w_c leads by atan(w_c / omega); equal corners, as most rigs have, lead by the same.
     """
-    leads = math.atan2(loop.drive_high_pass_rad_s, omega) - math.atan2(loop.force_high_pass_rad_s, omega)
+    leads = 0.0
+    if loop.drive_high_pass_rad_s != loop.force_high_pass_rad_s:
+        leads = math.atan2(loop.drive_high_pass_rad_s, omega) - math.atan2(loop.force_high_pass_rad_s, omega)
     return float(omega * loop.skew_samples * loop.dt_s + leads)
 
 

@@ -9,7 +9,7 @@ from rig.tick.layout import SENSOR_AT_RANGE, TickArrays
 from rig.tick.safety.kernels import check_gap, correct_motion, extrapolate_motion, watch_input, watch_motion
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive
-from vibrolock.compiled import kernel
+from vibrolock.compiled import inner_kernel, kernel
 
 STUCK_SAMPLES = 16
 """Least number of equal readings in a row after which a channel's motion is no longer integrated; see `stuck_after`."""
@@ -58,7 +58,7 @@ def uncertain_samples(t: TickArrays) -> int:
     return round(UNCERTAIN_PERIODS * TWO_PI / (dominant_omega(t) * float(t.loop[0].dt_s)))
 
 
-@kernel
+@inner_kernel
 def read_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
     """Check and convert every input channel; return the telemetry flags of the inputs."""
     loop, guard, limits = t.loop[0], t.guard[0], t.limits[0]

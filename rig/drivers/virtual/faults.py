@@ -14,7 +14,7 @@ from rig.bench.configuration import Configured
 from rig.continuation import SOURCE, begin, count_at, keep, period_steps, ramp_length, ring_for
 from rig.daq import CONTINUATION, CONTINUED, HELD, LOST
 from simulators.kernels import Flag, mix, unit
-from vibrolock.compiled import kernel
+from vibrolock.compiled import inner_kernel, kernel
 from vibrolock.described import Described
 
 OUTPUT_HELD = 1 << len(Flag)
@@ -154,11 +154,17 @@ def take_outputs(faults: FaultArrays, index: int) -> None:
     faults.kept_before[0] = index
 
 
-@kernel
+@inner_kernel
 def convert(faults: FaultArrays, index: int, voltage: float) -> tuple[float, int]:
     """Return the voltage on the converter at sample ``index``, held or continued if it is late, and the flags of the faults."""
     if not faults.any:
         return voltage, 0
+    return convert_with_faults(faults, index, voltage)
+
+
+@kernel
+def convert_with_faults(faults: FaultArrays, index: int, voltage: float) -> tuple[float, int]:
+    """Do as `convert`, of a device with faults; a call of its own, for which seventy numbers are put on the stack."""
     raised = 0
     if faults.share[_HIT_LATE] > 0.0:
         if index % faults.outputs.block == 0:

@@ -53,11 +53,17 @@ class Converters(NamedTuple):
     """That other rig, by the addresses of its arrays (`simulators.kernels.addressed`)."""
 
 
+@kernel
+def sample_released(released: np.ndarray, state: RigState, voltage: float, row: np.ndarray) -> int:
+    """Advance the released rig by one sample; not inlined, which would double the machine code of the loops."""
+    return int(sample(rig_at(released), state, voltage, row))
+
+
 @inner_kernel
 def sampled(rig: RigArrays, state: RigState, converters: Converters, voltage: float, row: np.ndarray) -> int:
     """Advance the rig by one sample: the released one while the output is 0 V, if it is to be released."""
     if converters.releases and voltage == 0.0:
-        return int(sample(rig_at(converters.released), state, voltage, row))
+        return int(sample_released(converters.released, state, voltage, row))
     return int(sample(rig, state, voltage, row))
 
 
