@@ -11,6 +11,7 @@ import runpy
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import traceback
 from pathlib import Path
@@ -24,6 +25,7 @@ LOADED = tuple(
         "rig/drivers/wire",
     )
 )
+RUNS = tuple(place.replace("/", ".") for place in ("rig/campaigns/plans", "rig/campaigns/running/runner"))
 HIGH = 200
 """Numbers of descriptors from here on are free."""
 
@@ -136,11 +138,21 @@ def _at_the_end() -> None:
     atexit._run_exitfuncs()
 
 
+def run_once() -> None:
+    """Carry out a short plan: machine code is loaded, and what a run imports as it goes on."""
+    planning, running = (importlib.import_module(name) for name in RUNS)
+    plan = planning.load_plan("magnet-beam/backbone-short")
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ |= {"VIBROLOCK_LIVE": folder, "XDG_STATE_HOME": folder}
+        running.run_plan(plan, planning.bench_of(plan, ""), Path(folder) / "run.h5").close()
+
+
 def main() -> None:
-    """Load, then serve."""
+    """Load, run, then serve."""
     connection = socket.socket(fileno=int(sys.argv[1]))
     for name in LOADED:
         importlib.import_module(name)
+    run_once()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: the tests' process ends this one
     gc.collect()
     gc.freeze()
