@@ -17,6 +17,10 @@ _LOW, _HIGH = 0.05, 2.0
 _MIN_HIGH = 1.1  # least frequency of the mode above the band, over the band's upper end; chosen
 _FLOOR_DAMPING = 0.005  # median of the prior of a damping ratio; chosen: that of lightly damped metal structures
 _COUPLING_HZ = 0.3  # corner frequency of the AC coupling of common IEPE conditioners, Hz
+_HIGHEST_COUPLING, _LONGEST_COIL_S = 1.0, 0.01
+"""Highest corner of the AC coupling, over the tested frequency, and longest time constant of a coil, s; chosen: exciters have
+0.05 to 5 ms. A longer one integrates what a higher corner differentiates: the responses in the band stay the same, and the
+force below it becomes a thousand times as large."""
 _DEFAULT_RATE_HZ = 5000.0
 """Sample rate for the prior of the delay where no responses were measured, Hz; chosen: that of the shipped benches."""
 MODE = ("frequency_hz", "damping_ratio", "drive_shape")  # parameters of a mode
@@ -34,13 +38,15 @@ class ParameterTable:
         self.centre: list[float] = []
         self.std: list[float] = []
         self.lowest: dict[str, float] = {}
+        self.highest: dict[str, float] = {}
 
     @property
     def bounds(self) -> tuple[Float, Float]:
         """Least and largest possible values [p]; without bounds for a parameter of any sign."""
         wide = np.where(self.positive, POSSIBLE, np.inf)
         least = [self.lowest.get(name, -np.inf) for name in self.names]
-        return np.maximum(self.centre - wide, least), self.centre + wide
+        most = [self.highest.get(name, np.inf) for name in self.names]
+        return np.maximum(self.centre - wide, least), np.minimum(self.centre + wide, most)
 
     def add(self, name: str, value: float, std: float = _UNKNOWN_LOG_STD, *, positive: bool = True) -> None:
         """Add a parameter; ``std`` is that of the logarithm of a positive one."""
@@ -112,6 +118,8 @@ def parameters_of(
     rate = _DEFAULT_RATE_HZ if responses is None else responses.sample_rate_hz
     out.add("delay_s", 0.0, 2.0 / rate, positive=False)
     out.add("coupling_hz", _COUPLING_HZ)
+    out.highest["coupling_hz"] = float(np.log(_HIGHEST_COUPLING * hertz))
+    out.highest["coil_time_constant_s"] = float(np.log(_LONGEST_COIL_S))
     lowest, highest = (0.4 * hertz, 2.5 * hertz) if responses is None else responses.frequency_hz[[0, -1]]
     out.mode("low", _LOW * float(lowest), 0.1 * shape, log_std=(1e-3, 1e-3, 2.0))
     out.mode("high", _HIGH * float(highest), shape, log_std=(0.5, 1e-3, 2.0))

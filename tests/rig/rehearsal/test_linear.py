@@ -174,3 +174,16 @@ def test_slopes_are_those_of_central_differences():
         difference = (ends[0] - ends[1]) / (2.0 * step[k])
         allowed = 1e-6 * np.max(np.abs(difference)) + 1e-10 * np.max(np.abs(ends))  # truncation and rounding
         np.testing.assert_allclose(exact[name], difference, rtol=0.0, atol=allowed, err_msg=name)
+
+
+def test_no_coil_integrates_what_an_ac_coupling_differentiates():
+    """With a coil of half a second and a coupling above the band the responses are the same, but not the force below it."""
+    heavy = {"force_per_volt_n_v": 244.0, "moving_mass_kg": 29.0, "exciter_damping_n_s_m": 6000.0}
+    true = {**TRUE, "frequency_hz": 40.7, "drive_shape": 0.381, "suspension_stiffness_n_m": 6.6e5, **heavy}
+    measured = responses_of(rig_of(true, beside=((275.0, 0.001, 1.75),)), np.linspace(16.0, 102.0, 300), 0.01)
+    found = posterior(["tip"], {name: true[name] for name in MODE}, {}, measured)
+    generator = np.random.default_rng(0)
+    for rig in (found.rig(), *(found.draw(generator) for _ in range(5))):
+        assert rig.of("force_per_volt_n_v") == pytest.approx(244.0, rel=0.05)
+        assert rig.of("coil_time_constant_s") <= 0.01
+        assert rig.of("coupling_hz") <= 1.01 * 40.7
