@@ -16,6 +16,8 @@ SAMPLES = 720  # samples of a period in a describing function; chosen: exact for
 cfunction = c_function("float64(float64, CPointer(float64))")
 """Compiles a force law as `simulators.sites.elements.User` wants it."""
 BOUND = 0.5  # displacement at which a softening spring begins to stop softening, over the highest one; chosen
+OF_POWER = {2: 3.0 / 4.0, 4: 5.0 / 8.0, 6: 35.0 / 64.0}
+"""Describing function of ``x^(p + 1)`` at unit amplitude, by the power p."""
 Element = dict[str, object]
 """Table of an element of a virtual rig, as in its file."""
 
@@ -51,9 +53,17 @@ def describing_function(force: Callable[[Float], Float], amplitude: float) -> fl
     return float(2.0 / (SAMPLES * amplitude) * np.sum(force(amplitude * cosine) * cosine))
 
 
-def hardening_for(at: str, stiffness_n_m: float, amplitude_m: float) -> Element:
-    """Return a cubic spring that adds a stiffness (N/m) at an amplitude (m): ``3/4 k3 a^2``."""
-    return {"kind": "cubic", "at": at, "stiffness_n_m3": stiffness_n_m / (0.75 * amplitude_m**2)}
+def hardening_for(at: str, stiffness_n_m: float, amplitude_m: float, power: int = 2) -> Element:
+    """Return a spring that adds a stiffness (N/m) at an amplitude (m), which grows by a power of it.
+
+    A force ``k3 x^3`` adds ``3/4 k3 a^2``, ``k5 x^5`` adds ``5/8 k5 a^4``, and ``k7 x^7`` adds ``35/64 k7 a^6``.
+    """
+    coefficient = stiffness_n_m / (OF_POWER[power] * amplitude_m**power)
+    if power == 2:
+        return {"kind": "cubic", "at": at, "stiffness_n_m3": coefficient}
+    return user_element(
+        at, odd_polynomial.__name__, "deflection", [coefficient if power == each else 0.0 for each in OF_POWER]
+    )
 
 
 def softening_for(at: str, stiffness_n_m: float, amplitude_m: float) -> Element:

@@ -1,7 +1,7 @@
 """Prior ranges of unmeasured properties of a twin, as a table (TOML)."""
 
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -18,11 +18,14 @@ class Hypotheses(Configured):
 
     hardening: float = Field(0.35, ge=0.0, le=1.0)
     """Probability of a spring that hardens."""
+    hardening_powers: tuple[Literal[2, 4, 6], ...] = Field((2, 4, 6), min_length=1)
+    """Powers of the amplitude by which its stiffness grows, all alike: 2 of a cubic spring, more of magnets and stops that come
+    near. The backbone of a power p is p times as steep as its shift."""
     softening: float = Field(0.35, ge=0.0, le=1.0)
     """Probability of a spring that softens, with a stiffness that stays above a bound."""
-    shift: tuple[float, float] = (0.002, 0.08)
+    shift: tuple[float, float] = (0.002, 0.12)
     """Relative shift of the modal frequency at the highest level, by either spring."""
-    damping_growth: tuple[float, float] = (1.0, 3.0)
+    damping_growth: tuple[float, float] = (1.0, 1.5)
     """Damping ratio at the highest level over that at a low one, by drag; every twin has some drag."""
     joint: float = Field(0.2, ge=0.0, le=1.0)
     """Probability of a joint that slips, beside the springs."""
@@ -65,7 +68,7 @@ class Hypotheses(Configured):
             total = self.hardening + self.softening
             raise ValueError(f"hardening + softening = {total:g}: allowed is up to 1, a twin has one spring at most")
         for name, value in self:
-            if isinstance(value, tuple) and not 0.0 < value[0] <= value[1]:
+            if isinstance(value, tuple) and name != "hardening_powers" and not 0.0 < value[0] <= value[1]:
                 raise InputError(field=name, value=list(value), allowed="two numbers above 0, the lower one first")
         for name in ("shift", "joint_shift"):
             highest = getattr(self, name)[1]

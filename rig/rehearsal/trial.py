@@ -108,7 +108,7 @@ class Trial:
     @property
     def lost_lock(self) -> bool:
         """Whether the lock was lost, or never gained, at any point."""
-        lost = {"lost-lock", "not-locked", "outside-window"}
+        lost = {"lost-lock", "too-steep", "not-locked", "outside-window"}
         return self.end in ("LOST_LOCK", "NO_LOCK", "NO_LOCK_IN_WINDOW") or any(p.quality in lost for p in self.points)
 
 

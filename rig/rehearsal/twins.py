@@ -112,18 +112,25 @@ class _Sample:
         second, at, shape = self._property(
             hypotheses.second_mode, hypotheses.second_mode_at, hypotheses.second_mode_shape
         )
+        power = hypotheses.hardening_powers[int(self.generator.random() * len(hypotheses.hardening_powers))]
         points = ["drive", *self.linear.channels]
         self.at = points[int(place * len(points))]
         self.ratio = abs(1.0 if self.at == "drive" else self.linear.of(f"ratio {self.at}")) or 1.0
         if self.knowledge.mode is None:
             if kind >= hypotheses.hardening + hypotheses.softening:
                 shift = 0.0
-            self._spring(shift if kind < hypotheses.hardening else -shift)
+            self._spring(shift if kind < hypotheses.hardening else -shift, power)
             self._velocity_damping(growth)
             self._joint(joint_shift if joint else 0.0, slip)
         else:
             self.elements.extend(elements_of(self.knowledge.mode, self.linear, self.generator))
-            self.unknowns |= {"shift": 0.0, "damping_growth": 1.0, "joint_shift": 0.0, "joint_slip": 0.0}
+            self.unknowns |= {
+                "shift": 0.0,
+                "hardening_power": 0.0,
+                "damping_growth": 1.0,
+                "joint_shift": 0.0,
+                "joint_slip": 0.0,
+            }
         self._stop(gap if stop else 0.0, stiffness)
         self.unknowns["second_mode"] = at if second and abs(at - 1.0) > 0.05 else 0.0
         if self.unknowns["second_mode"]:
@@ -132,12 +139,14 @@ class _Sample:
     def _modal_stiffness(self, at_ratio: float) -> float:
         return self.omega**2 / (at_ratio * self.linear.of("drive_shape")) ** 2
 
-    def _spring(self, shift: float) -> None:
+    def _spring(self, shift: float, power: int) -> None:
         self.unknowns["shift"] = shift
-        if shift:
-            stiffness = self._modal_stiffness(1.0) * ((1.0 + shift) ** 2 - 1.0)
-            make = hardening_for if shift > 0.0 else softening_for
-            self.elements.append(make(INSIDE, stiffness, self.highest_m))
+        self.unknowns["hardening_power"] = float(power) if shift > 0.0 else 0.0
+        stiffness = self._modal_stiffness(1.0) * ((1.0 + shift) ** 2 - 1.0)
+        if shift > 0.0:
+            self.elements.append(hardening_for(INSIDE, stiffness, self.highest_m, power))
+        elif shift < 0.0:
+            self.elements.append(softening_for(INSIDE, stiffness, self.highest_m))
 
     def _velocity_damping(self, growth: float) -> None:
         self.unknowns["damping_growth"] = growth

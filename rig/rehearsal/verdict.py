@@ -83,6 +83,7 @@ ADVICE = {
     "moving_mass_kg": "identify the exciter over a wider band",
     "gain_factor": "check the amplifier's gain just before the test (`rig check`)",
     "shift": "run the lowest levels first and look how far the frequency moves",
+    "hardening_power": "run all levels but the highest ones first, and look how fast the frequency moves",
     "damping_growth": "run the lowest levels first and look how the damping grows",
     "joint_shift": "run the lowest levels first: a joint that slips shows in the damping",
     "joint_slip": "run the lowest levels first: a joint that slips shows in the damping",

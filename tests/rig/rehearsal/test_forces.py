@@ -29,6 +29,14 @@ def test_describing_functions_are_those_of_the_textbook():
     assert describing_function(lambda x: x * np.abs(x), 2.0) == pytest.approx(8.0 / (3.0 * math.pi) * 2.0, rel=1e-5)
 
 
+@pytest.mark.parametrize(("power", "place"), [(4, 1), (6, 2)])
+def test_steeper_springs_add_their_stiffness_at_their_amplitude(power, place):
+    spring = hardening_for("drive", 500.0, 2e-3, power)
+    assert [k > 0.0 for k in spring["parameters"]] == [n == place for n in range(3)]
+    coefficient = spring["parameters"][place]
+    assert describing_function(lambda x: coefficient * x ** (power + 1), 2e-3) == pytest.approx(500.0)
+
+
 def test_springs_add_their_stiffness_at_their_amplitude():
     cubic = hardening_for("drive", 500.0, 2e-3)
     assert 0.75 * cubic["stiffness_n_m3"] * (2e-3) ** 2 == pytest.approx(500.0)
@@ -38,9 +46,9 @@ def test_springs_add_their_stiffness_at_their_amplitude():
     assert -1.0e3 < secant < -500.0
 
 
-@pytest.mark.parametrize("kind", ["hardening", "softening"])
-def test_a_twin_shifts_by_what_was_drawn(kind):
-    hypotheses = Hypotheses(**{**NOTHING, kind: 1.0, "shift": (0.03, 0.03)})
+@pytest.mark.parametrize(("kind", "powers"), [("hardening", (2,)), ("hardening", (6,)), ("softening", (2,))])
+def test_a_twin_shifts_by_what_was_drawn(kind, powers):
+    hypotheses = Hypotheses(**{**NOTHING, kind: 1.0, "shift": (0.03, 0.03), "hardening_powers": powers})
     twin = draw_twin(magnet_beam(), PLAN, knowledge_of_the_magnet_beam(1e-6), hypotheses, 0, 0)
     rig = VirtualDAQ(twin.bench).rig
     low, high = 1e-6, 0.0021  # of the highest level on the linear rig, 3.0948 V
