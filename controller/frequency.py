@@ -5,7 +5,7 @@ from enum import IntEnum
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
 from controller.primitives import proportional_integral
 from controller.settings import Settings
@@ -32,9 +32,11 @@ GAINS = {"phase": ("k1", "k2"), "frequency-error": ("frequency_proportional", "f
 
 FREQUENCY = record(
     i8="law period_mean feed_forward",
-    f8="kp ki centre_rad_s lowest_rad_s highest_rad_s mode_shape_squared target_lag_rad dt_s",
+    f8="kp ki centre_rad_s lowest_rad_s highest_rad_s mode_shape_squared target_lag_rad dt_s most_softening most_hardening",
 )
-"""Parameters of the frequency law (one record). ``target_lag_rad``: wanted lag where the plan names none."""
+"""Parameters of the frequency law (one record). ``target_lag_rad``: wanted lag where the plan names none; ``most_softening``,
+``most_hardening``: steepest backbone that the gains bear, ``-d ln(frequency)/d ln(level)`` and the same with plus, 0 if
+unknown."""
 
 FREQUENCY_STATE = record(i8="clamped taking_over", f8="omega integral mean_error_rad")
 """State of the frequency law (one record): the oscillator's frequency (rad/s), the PI law's integral (rad/s), the mean phase
@@ -82,6 +84,10 @@ class FrequencySettings(Settings):
     frequency_feed_forward: bool = False
     """Whether the frequency changes with the level during a ramp, by the slope of the frequency over the level that the points
     before have shown. The phase error then does not grow with the ramp's rate."""
+    steepest_backbone: tuple[PositiveFloat, PositiveFloat] | None = None
+    """Softening and hardening, both as a size of ``d ln(frequency)/d ln(level)``, with which the loops are still stable. A
+    ramp to a higher level in metres gives it up where the backbone becomes steeper. Without it a ramp goes on until the lock is
+    lost."""
 
     @model_validator(mode="after")
     def _frequency_possible(self) -> Self:
@@ -127,6 +133,7 @@ class FrequencySettings(Settings):
         out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in self.frequency_window_hz)
         out["period_mean"] = self.period_mean
         out["feed_forward"] = self.frequency_feed_forward
+        out["most_softening"], out["most_hardening"] = self.steepest_backbone or (0.0, 0.0)
         out["mode_shape_squared"] = (drive_mode_shape or 0.0) ** 2
         out["target_lag_rad"] = math.radians(self.phase_lag_deg)
         out["dt_s"] = 1.0 / sample_rate_hz

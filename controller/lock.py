@@ -28,6 +28,10 @@ class LockState(IntEnum):
 
 SEARCHING, ACQUIRING, LOCKED, LOST = (int(state) for state in LockState)
 
+MOST_SLOWING, FORETOLD_SLOWING = 0.95, 0.8
+"""Part of its rate that a ramp loses on the steepest backbone, and on one that is foretold to be so; chosen: it still gets
+there, and takes not much longer where a stop makes the backbone steep at once and then no more."""
+STEEP_PERIODS = 3  # in a row: one disturbed period ends no ramp; chosen: beyond a fold a vibration jumps within ten
 SWINGING = 3  # times as many far periods, less close ones, lose a lock whose phase swings to and fro
 
 THRESHOLDS = record(
@@ -35,11 +39,16 @@ THRESHOLDS = record(
 )
 """Thresholds at which a lock is gained and lost (one record)."""
 
-LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained side swings", f8="slowing")
+LOCK = record(
+    i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained side swings steep_periods",
+    f8="slowing steep_slowing",
+)
 """State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
 ``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``gained``: there has been a lock
 before; ``side``: sign of the last error out of the band, and ``swings``: how often it has changed, in a ramp that waits, since
-the last lock; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower."""
+the last lock; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower;
+``steep_slowing``: the same by the slope of the backbone; ``steep_periods``: in a row, in a ramp up on a backbone steeper than
+the gains bear."""
 
 
 class LockRule(Settings):
@@ -134,10 +143,22 @@ def next_lock_state(
 
 
 @kernel
+def mind_steepness(lock: Record, here: float, ahead: float) -> None:
+    """Slow an upward ramp from half of the steepest backbone that the gains bear, and give it up beyond that.
+
+    ``here``, ``ahead``: slope of the backbone at the present level, and as foretold at the end of the ramp, over the steepest.
+    """
+    lock.steep_slowing = max(min(2.0 * here - 1.0, MOST_SLOWING), min(2.0 * ahead - 1.0, FORETOLD_SLOWING), 0.0)
+    lock.steep_periods = lock.steep_periods + 1 if here > 1.0 else 0
+    if lock.steep_periods >= STEEP_PERIODS:
+        lock.state = LOST
+
+
+@kernel
 def reacquire(lock: Record) -> None:
     """Return to ACQUIRING because a new level is being approached; a lost lock may be sought again."""
     lock.out_of_band_periods = 0
     lock.in_band_periods = 0
     lock.net_out_of_band_periods = 0
-    lock.side = lock.swings = 0
+    lock.side = lock.swings = lock.steep_periods = 0
     lock.state = ACQUIRING

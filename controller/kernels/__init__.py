@@ -19,15 +19,20 @@ if TYPE_CHECKING:
     from controller.feed_forward import (
         add_to_backbone as add_to_backbone,
         follow_backbone as follow_backbone,
+        foretold_slope as foretold_slope,
         forget_backbone as forget_backbone,
+        logarithmic_slope as logarithmic_slope,
+        steepness as steepness,
     )
-    from controller.frequency import follow as follow
+    from controller.frequency import follow as follow, frequency_error as frequency_error
     from controller.law import measure_phase as measure_phase
     from controller.lock import (
         LOCK as LOCK,
         LOCKED as LOCKED,
         LOST as LOST,
         SEARCHING as SEARCHING,
+        STEEP_PERIODS as STEEP_PERIODS,
+        mind_steepness as mind_steepness,
         next_lock_state as next_lock_state,
         reacquire as reacquire,
     )

@@ -3,7 +3,19 @@
 import math
 
 from controller.harmonics import end_harmonics_period, left_alone
-from controller.kernels import LOCKED, RESPONSE, VOLTAGE, end_period, next_lock_state, size
+from controller.kernels import (
+    LOCKED,
+    RESPONSE,
+    VOLTAGE,
+    end_period,
+    foretold_slope,
+    frequency_error,
+    logarithmic_slope,
+    mind_steepness,
+    next_lock_state,
+    size,
+    steepness,
+)
 from rig.tick.layout import TickArrays
 from rig.tick.safety.keeping import begin_level, foretold_level, gain_has_changed, is_far_above
 from rig.tick.safety.kernels import shut_down
@@ -76,6 +88,23 @@ def end_harmonics(t: TickArrays) -> float:
 
 
 @kernel
+def mind_backbone(t: TickArrays) -> None:
+    """Slow an upward ramp, or give it up, by how steep the backbone is where the vibration is, and how steep it is foretold.
+
+    In a ramp the vibration lags behind its level, and the oscillator behind the resonance: the slope is that of the resonance
+    over the amplitude, as the last period shows them.
+    """
+    law, control, progress = t.law[0].frequency, t.control[0], t.progress[0]
+    period, omega = control.period, control.frequency.omega
+    compliance = law.mode_shape_squared * period.force_n / period.drive_m_s2
+    resonance = omega + frequency_error(period.error_rad, compliance, omega, progress.lag)
+    target = t.segments[progress.segment].level
+    here = logarithmic_slope(control.backbone, period.held, target, resonance)
+    ahead = foretold_slope(control.backbone, target)
+    mind_steepness(control.lock, steepness(law, here), steepness(law, ahead))
+
+
+@kernel
 def close_period(t: TickArrays) -> None:
     """Process the end of an oscillator period at the inputs."""
     loop, control = t.loop[0], t.control[0]
@@ -93,6 +122,9 @@ def close_period(t: TickArrays) -> None:
         progress = t.progress[0]
         waits = progress.entered == 1 and waits_for_phase(progress, t.segments[progress.segment])
         next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad, waits)
+        lock.steep_slowing = 0.0
+        if waits and present and amplitude.law == RESPONSE:
+            mind_backbone(t)
     # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
     saturated = amplitude.output.saturation_sign != 0 and amplitude.law == VOLTAGE
     locked = (open_loop or lock.state == LOCKED) and not saturated

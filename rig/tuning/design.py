@@ -38,12 +38,15 @@ LOW_PASSES = (5.0, 10.0, 20.0)  # candidates: resonance frequency divided by the
 SHARES = (1.0 / 8.0, 1.0 / 16.0, 1.0 / 40.0)  # of the low-pass: integral gain of the frequency error
 PROPORTIONALS = (0.0, 0.3, 0.7)  # proportional gain of the frequency error
 RESPONSE_SHARES = (3.0 / 8.0, 1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0)  # of the low-pass: integral gain of the response loop
-CANCELS = (1.0, 0.25, 1.6, 1.5 * cmath.exp(-0.34j))  # times the proportional gain that cancels the coupled pole
+CANCELS = (1.0, 0.25, 1.6, 3.0, 1.5 * cmath.exp(-0.34j))  # times the proportional gain that cancels the coupled pole
 WANTED_SOFTENING, WANTED_HARDENING = 0.06, 0.25
 """d ln(frequency)/d ln(amplitude) up to which the loops have to stay stable; chosen."""
 SOFTENED, HARDENED = -0.05, 0.1
 """Of the frequency: shifts at which a softening or hardening structure stays stable as well."""
-MAX_SLOPE_LOSS = 0.2  # of the wanted range of slopes (2: all of it) that is given away for quicker gains
+SHIFTS = (-0.05, -0.02, 0.0, 0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2)
+"""Of the frequency: shifts at which what the gains bear is looked at; chosen."""
+ALIKE = 2.5  # largest over smallest slope that they bear at these shifts, for it to be believed; chosen
+MAX_SLOPE_LOSS = 0.1  # of softening and of hardening that is given away for quicker gains; chosen
 MAX_SENSITIVITY, OTHER_SENSITIVITY = 2.0, 3.0
 """Largest max |S| of chosen gains, at the measured damping and at other dampings; chosen."""
 MAX_GAIN_OUTSIDE = 0.5  # largest gain of the response loop at other modes
@@ -143,14 +146,30 @@ class _Candidate:
     slopes: tuple[float, float]
 
     @property
-    def worth(self) -> float:
-        """Part of the wanted range of softening and hardening that the loop bears, from 0 to 2."""
-        return min(self.slopes[0] / WANTED_SOFTENING, 1.0) + min(self.slopes[1] / WANTED_HARDENING, 1.0)
+    def borne(self) -> tuple[float, float]:
+        """Parts of the wanted softening and hardening that the loop bears, 0 to 1."""
+        return min(self.slopes[0] / WANTED_SOFTENING, 1.0), min(self.slopes[1] / WANTED_HARDENING, 1.0)
+
+    def bears_nearly(self, other: "_Candidate") -> bool:
+        """Return whether it bears at most `MAX_SLOPE_LOSS` less softening and hardening than another one."""
+        return all(own >= (1.0 - MAX_SLOPE_LOSS) * most for own, most in zip(self.borne, other.borne, strict=True))
 
     @property
     def quickness(self) -> float:
         """Rate of the slower of the two loops, 1/s."""
         return self.loop.low_pass_rad_s * min(self.share / (1.0 + self.proportional), 0.5 * self.response_share)
+
+
+def steepest_backbone(loop: ControlLoop) -> tuple[float, float]:
+    """Return the softening and the hardening that the loop bears wherever a nonlinear structure may shift its frequency.
+
+    Both are the least of `controller.tuning.hardening_margins` over `SHIFTS`, and infinite where these differ by more than
+    `ALIKE`: where the resonance crosses that of the exciter, linear theory foretells instability through which runs have gone.
+    """
+    plants = [loop.plant.at(frequency_rad_s=(1.0 + shift) * loop.plant.frequency_rad_s) for shift in SHIFTS]
+    borne = list(zip(*(hardening_margins(replace(loop, plant=plant)) for plant in plants), strict=True))
+    softening, hardening = (min(slopes) if max(slopes) <= ALIKE * min(slopes) else math.inf for slopes in borne)
+    return softening, hardening
 
 
 def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candidate]:
@@ -178,16 +197,18 @@ def _quickest(
 ) -> tuple[int, _Candidate | None, Design | None]:
     """Return the number of candidates tried, and of those that suit the quickest, with its assessment.
 
-    It bears at most `MAX_SLOPE_LOSS` less of the wanted range than the one that bears most of it.
+    It bears at most `MAX_SLOPE_LOSS` less softening and hardening than the one that bears most of what is wanted.
     """
-    tried, least, best, design = 0, -math.inf, None, None
-    for candidate in sorted(candidates, key=lambda one: -one.worth):
-        if candidate.worth < least:
-            break
+    tried = 0
+    steadiest: _Candidate | None = None
+    best: _Candidate | None = None
+    design: Design | None = None
+    for candidate in sorted(candidates, key=lambda one: -sum(one.borne)):
+        if steadiest is not None and not candidate.bears_nearly(steadiest):
+            continue
         tried += 1
         if (best is None or candidate.quickness > best.quickness) and (suited := suits(candidate.loop)):
-            least = candidate.worth - MAX_SLOPE_LOSS if best is None else least
-            best, design = candidate, suited
+            steadiest, best, design = steadiest or candidate, candidate, suited
     return tried, best, design
 
 

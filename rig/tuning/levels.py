@@ -53,9 +53,18 @@ LIMIT_FRACTION = 1.0 / 3.0  # of the limits, on the linear plant; the rest is ro
 SPAN = 30.0  # highest level over lowest, where noise allows
 MIN_SPAN = 1.5  # highest level over lowest that rounding may reduce it to; the lowest points may then be refused
 MIN_FORCE_BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
-MAX_NONHARMONIC = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
+MAX_NONHARMONIC = 0.05
+"""Of the force's RMS: what rounding may add at the lowest level. Plans accept 0.1 by default: lines of a rounded sine may lie
+where the force per volt is large, and add twice as much as if they were spread evenly."""
 NARROW_SPAN = 10.0  # span below which rounding may add more, and the plan accepts more
-RELAXED_NONHARMONIC, ACCEPTED_NONHARMONIC = 0.15, 0.25  # of the force's RMS: these two then; chosen
+ACCEPTED_QUIET = 0.15  # of the force's RMS: what a plan accepts where `MAX_NONHARMONIC` bounds its lowest level; chosen
+MOST_NONHARMONIC = (
+    0.2  # of the force's RMS: what rounding may be foreseen to add where a plan accepts `ACCEPTED_NONHARMONIC`
+)
+SHORT_SPAN = 4.0  # span below which the lowest level is no longer raised for a lower rounding; chosen
+RELAXED_NONHARMONIC, ACCEPTED_NONHARMONIC = (0.1, 0.15), 0.25
+"""Of the force's RMS, below `NARROW_SPAN`: what rounding may add down to `SHORT_SPAN` and below it, and what the plan accepts;
+chosen."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +129,7 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
 
     It is a part of the highest force, but at least a few bits of the input converter, and so large that rounding in both
     converters adds no more than `MAX_NONHARMONIC` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where
-    that leaves less than a span of `NARROW_SPAN`, rounding may add `RELAXED_NONHARMONIC`.
+    that leaves less than a span of `NARROW_SPAN`, rounding may add more (`RELAXED_NONHARMONIC`).
     """
     force, highest_n = bench.channels[bench.index_of("force")], needed_n(plant, highest_m)
     read_n, sent_n = rounding(force.resolution_in_unit, force.noise_rms), bits_force_n
@@ -134,8 +143,9 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
     which = "output" if sent_n > read_n else "force"
     bound = f"the last bits of the {which} converter, which add {rounded_n:.2g} N RMS at other frequencies"
     if quiet_n <= highest_n / NARROW_SPAN:
-        return LowestForce(quiet_n, bound)
-    more_n = max(few_n, math.sqrt(2.0) * rounded_n / RELAXED_NONHARMONIC)
+        return LowestForce(quiet_n, bound, ACCEPTED_QUIET)
+    quieter_n, noisier_n = (math.sqrt(2.0) * rounded_n / part for part in RELAXED_NONHARMONIC)
+    more_n = max(few_n, noisier_n, min(quieter_n, highest_n / SHORT_SPAN))
     return LowestForce(min(max(more_n, highest_n / NARROW_SPAN), highest_n / MIN_SPAN), bound, ACCEPTED_NONHARMONIC)
 
 

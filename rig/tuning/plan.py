@@ -8,7 +8,7 @@ from textwrap import wrap
 from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.text.json_values import JsonValue
-from rig.tuning.design import Chosen, gains_of
+from rig.tuning.design import Chosen, gains_of, steepest_backbone
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
 from rig.tuning.plant import ChannelRatios
@@ -18,6 +18,7 @@ HARMONICS = 5  # harmonics that are evaluated; chosen
 AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
 MIN_TIMEOUT_PERIODS = 1000  # shortest time in which a point must settle, periods; chosen
 LOST_PERIODS = 20  # at least
+GENTLE = 1.0  # largest slope that is written: beyond, no backbone is steeper
 WAITING_DEG = 15.0  # error above which a ramp waits: the loops are quick
 
 
@@ -81,6 +82,7 @@ def plan_text(
         *_gains(chosen),
         "# In a ramp the frequency changes with the level as from point to point before.",
         _line("frequency_feed_forward", True),
+        *([] if volts else _slopes(chosen)),
         *_comment(f"Resonance of the structure alone as measured; {window.why}."),
         _line("centre_frequency_hz", significant(hertz, 6)),
         _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),
@@ -107,6 +109,12 @@ def plan_text(
             facts += [f"{key} = {{ {listed} }}"] if values else []
     settle = settle if math.isfinite(settling) else []
     return "\n".join([*_summary(plant, chosen), *head, *controller, *settle, *facts]) + "\n"
+
+
+def _slopes(chosen: Chosen) -> list[str]:
+    text = "Softening and hardening, d ln(frequency)/d ln(level), that these gains bear"
+    slopes: list[JsonValue] = [significant(min(slope, GENTLE), 3) for slope in steepest_backbone(chosen.design.loop)]
+    return [*_comment(f"{text}: a ramp ends where the backbone is steeper."), _line("steepest_backbone", slopes)]
 
 
 def _harmonics(choice: HarmonicsChoice) -> list[str]:

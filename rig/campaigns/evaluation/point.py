@@ -40,6 +40,8 @@ class Quality(StrEnum):
     """The settle rule was broken while recording."""
     LOST_LOCK = "lost-lock"
     """The phase lock was lost."""
+    TOO_STEEP = "too-steep"
+    """The backbone became steeper than the gains bear."""
     NOT_LOCKED = "not-locked"
     """No phase lock was reached."""
     UNREACHABLE = "unreachable"

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from controller.kernels import LOCKED, LOST, VOLTAGE, reacquire
+from controller.kernels import LOCKED, LOST, STEEP_PERIODS, VOLTAGE, reacquire
 from rig.tick.safety.kernels import shut_down
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.judgement import (
@@ -78,18 +78,19 @@ def give_up(
     elapsed = progress.cycle - progress.start_cycle
     close_segment(progress, outcomes, settling, failure)
     far_off = failure == Outcome.OUTSIDE_WINDOW or was_always_far(lock, elapsed)
+    lost = failure == Outcome.LOST_LOCK or failure == Outcome.TOO_STEEP
     if segment.kind == SegmentKind.START or (progress.unlocked == 1 and segment.drive == Drive.LOOP and far_off):
         progress.finished = 1
         reason = EndReason.NO_LOCK_IN_WINDOW if failure == Outcome.OUTSIDE_WINDOW else EndReason.NO_LOCK
         shut_down(guard, reason, -1, 0.0, progress.sample, False)
-    elif (segment.on_lost_lock if failure == Outcome.LOST_LOCK else segment.on_failure) == OnFailure.STOP:
+    elif (segment.on_lost_lock if lost else segment.on_failure) == OnFailure.STOP:
         progress.finished = 1
         reason = EndReason.LOST_LOCK if failure == Outcome.LOST_LOCK else EndReason.PLAN_STOPPED
         shut_down(guard, reason, -1, 0.0, progress.sample, False)
     else:
-        if failure == Outcome.LOST_LOCK:
+        if lost:
             lock.state = LOST
-        skip_point(progress, segments, outcomes, failure == Outcome.LOST_LOCK)
+        skip_point(progress, segments, outcomes, lost)
 
 
 @kernel
@@ -143,7 +144,7 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     progress.start_lag = progress.lag
     progress.last_cycle = progress.cycle
     progress.frozen_cycles = 0.0
-    progress.waited_cycles = 0.0
+    progress.waited_cycles = progress.slowed_cycles = 0.0
     progress.held = 0
     progress.continued = 0
     progress.lost = 0
@@ -239,7 +240,8 @@ def step_ramp(
 ) -> None:
     """Set level, lag and frequency of a ramp that has taken ``elapsed`` periods; move on at its end, or give up."""
     segment = segments[progress.segment]
-    done = min((elapsed - progress.frozen_cycles - progress.waited_cycles) / segment.periods, 1.0)
+    lost = progress.frozen_cycles + progress.waited_cycles + progress.slowed_cycles
+    done = min((elapsed - lost) / segment.periods, 1.0)
     rise = 0.5 * (1.0 - math.cos(math.pi * done))
     progress.level = ramped(progress.start_level, segment.level, rise, segment.geometric == 1)
     progress.lag = between(progress.start_lag, segment.lag_rad, rise)
@@ -252,6 +254,8 @@ def step_ramp(
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.OUTSIDE_WINDOW)
     elif progress.frozen_cycles >= SATURATED_PERIODS:
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.UNREACHABLE)
+    elif lock.steep_periods >= STEEP_PERIODS:
+        give_up(progress, segments, outcomes, settling, lock, guard, Outcome.TOO_STEEP)
     elif progress.waited_cycles >= LONGEST_WAIT or (lock.state == LOST and waits_for_phase(progress, segment)):
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.LOST_LOCK)
 
@@ -298,8 +302,9 @@ def advance(
     climbs = is_ramp(segment.kind) and segment.level > progress.level
     if climbs and progress.unreached == 1:
         progress.frozen_cycles += passed
-    elif climbs:
-        progress.waited_cycles += passed * (lock.slowing if waits_for_phase(progress, segment) else 0.0)
+    elif climbs and waits_for_phase(progress, segment):
+        progress.waited_cycles += passed * lock.slowing
+        progress.slowed_cycles += passed * max(lock.steep_slowing - lock.slowing, 0.0)
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
         step_ramp(progress, segments, outcomes, settling, lock, guard, elapsed)

@@ -72,6 +72,8 @@ class Outcome(IntEnum):
     """Too many samples were lost in transmission."""
     OUTPUT_CONTINUED = 13
     """The device went on by itself for too many samples, because outputs came too late."""
+    TOO_STEEP = 14
+    """On the way to its level the backbone became steeper than the gains bear."""
 
 
 class OnFailure(IntEnum):
@@ -112,14 +114,15 @@ PROGRESS = record(
     ("refused", REFUSED, (RING,)),
     i8="segment segments sample unreached returning held_back start_sample finished entered unlocked point "
     "tries_left retries held continued lost disturbed n_refused",
-    f8="cycle start_cycle last_cycle frozen_cycles waited_cycles kept_level start_level level start_lag lag "
+    f8="cycle start_cycle last_cycle frozen_cycles waited_cycles slowed_cycles kept_level start_level level start_lag lag "
     "start_omega omega faulty_share faulty_before",
 )
 """Position of the run in the plan (one record). ``cycle``: oscillator periods at the inputs so far, with the fraction;
 ``unreached``: the output is at its limit and the present level is not reached; ``frozen_cycles``: periods for which a ramp
-waited because its level was not reached; ``waited_cycles``: those for which it waited for the phase; ``unlocked``: no lock was
-ever gained. ``kept_level``: the last held level with a lock; ``held_back``: the start segment does not end before the campaign
-has judged it; ``returning``: the level goes back there because the lock was lost.
+waited because its level was not reached; ``waited_cycles``: those for which it waited for the phase; ``slowed_cycles``: those
+by which a steep backbone made it longer; ``unlocked``: no lock was ever gained. ``kept_level``: the last held level with a
+lock; ``held_back``: the start segment does not end before the campaign has judged it; ``returning``: the level goes back there
+because the lock was lost.
 
 ``retries``: how often a record is measured again at most; ``point``, ``tries_left``: how often the record of the present point
 still may be. ``held``, ``continued``, ``lost``: samples of the present segment with a held output, with a continued one, and

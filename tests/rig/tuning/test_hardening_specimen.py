@@ -8,6 +8,7 @@ import pytest
 import rig
 from identification import nonlinear_mode
 from rig.bench import Bench
+from rig.rehearsal import forces
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tuning import tune
 from simulators import VirtualRig
@@ -45,6 +46,8 @@ OPTIONS = {
     "converter": {"sample_rate_hz": 2000.0, "oversampling": 4, "substeps": 8, "anti_alias_hz": 800.0},
 }
 OWN = VirtualRig.model_validate(OPTIONS)
+STIFFNESS = float((2.0 * math.pi * OWN.linear_modes.frequency_hz[0] / OWN.linear_modes.at(OWN.shape("tip"))[0]) ** 2)
+"""Modal stiffness of the first mode at the tip, N/m."""
 
 
 @pytest.fixture(scope="module")
@@ -117,3 +120,40 @@ def test_ramps_keep_the_phase_because_the_frequency_follows_the_points_before(be
     assert max(errors) < 10.0
     assert max(without) > 15.0  # they ran into their own lag, and waited
     assert periods < waiting
+
+
+@pytest.fixture(scope="module")
+def steep(bench, tmp_path_factory):
+    """The beam with a spring of seventh order and a heavier exciter, steeper at the top than any gains bear, and its plan."""
+    options = OPTIONS | {
+        "exciter": OPTIONS["exciter"] | {"armature_mass_kg": 0.1},
+        "elements": [
+            {"kind": "user", "at": "tip", "of": "deflection", "function": f"{forces.__name__}:odd_polynomial"}
+            | {"parameters": [0.0, 0.0, 0.3 * STIFFNESS / (35.0 / 64.0 * 0.004**6)]}
+        ],
+    }
+    steep = bench.model_copy(update={"driver": bench.driver.model_copy(update={"options": options})})
+    return steep, tune(steep, tmp_path_factory.mktemp("steep") / "test.h5").plan
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_backbone_steeper_than_the_gains_bear_ends_in_order_below_its_top(steep, seed):
+    bench, plan = steep
+    with rig.run(plan, bench=bench, seed=seed) as run:
+        end, points = run.recording.parts[-1].end, run.recording.points
+        mode = nonlinear_mode(run.backbone())
+    assert (end["reason"], end["tripped"]) == ("completed", False)
+    assert [point["quality"] for point in points if not point["accepted"]] == ["too-steep"]
+    assert "too-steep" in end["skipped"]
+    slopes = np.diff(np.log(mode.modal_frequency_hz)) / np.diff(np.log(mode.amplitude_m))
+    assert np.all(slopes < plan.controller.steepest_backbone[1])
+    assert slopes[-1] > 0.3 * plan.controller.steepest_backbone[1]  # no level that holds is left out for nothing
+
+
+@pytest.mark.slow
+def test_without_the_bound_the_same_run_trips(steep):
+    bench, plan = steep
+    unbounded = plan.controller.model_copy(update={"steepest_backbone": None})
+    with rig.run(plan.model_copy(update={"controller": unbounded}), bench=bench, seed=1) as run:
+        assert run.recording.parts[-1].end["tripped"]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from controller import AmplitudeLaw, LockState
-from controller.kernels import LOCK, PERIOD
+from controller.kernels import LOCK, PERIOD, STEEP_PERIODS
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import guard_record
 from rig.tick.sequencer.judgement import SETTLING, forget_periods, judge_period
@@ -493,7 +493,7 @@ def test_a_plan_without_retries_tries_nothing_again_however_much_better_it_becam
     assert _refused(walk) == []
 
 
-@pytest.mark.parametrize("outcome", ["NOT_SETTLED", "LOST_LOCK", "UNREACHABLE", "OUTSIDE_WINDOW"])
+@pytest.mark.parametrize("outcome", ["NOT_SETTLED", "LOST_LOCK", "TOO_STEEP", "UNREACHABLE", "OUTSIDE_WINDOW"])
 def test_what_does_not_pass_is_not_repeated(outcome):
     skips = OnFailure.SKIP, OnFailure.SKIP
     walk = _recording(3, *_point(0, 1.0, *skips), *_point(1, 2.0))
@@ -505,6 +505,9 @@ def test_what_does_not_pass_is_not_repeated(outcome):
         walk.go(42)
     elif outcome == "LOST_LOCK":
         walk.lock["state"] = LockState.LOST
+    elif outcome == "TOO_STEEP":
+        walk = Walk(*_point(0, 1.0, *skips), *_point(1, 2.0))
+        walk.lock["steep_periods"] = STEEP_PERIODS
     elif outcome == "UNREACHABLE":
         walk.settling["saturated_periods"] = 20
     else:
