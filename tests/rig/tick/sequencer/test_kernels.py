@@ -517,6 +517,39 @@ def test_what_does_not_pass_is_not_repeated(outcome):
     assert _refused(walk) == []
 
 
+@pytest.mark.parametrize("rule", [OnFailure.SKIP, OnFailure.STOP])
+def test_a_backbone_that_becomes_too_steep_leaves_out_the_level_and_what_is_above(rule):
+    ramps = [
+        Segment(kind, number, level, 10.0, on_lost_lock=rule)
+        for number, level in ((0, 1.0), (1, 2.0), (2, 3.0), (3, 0.5))
+        for kind in (SegmentKind.RAMP, SegmentKind.HOLD)
+    ]
+    walk = Walk(*ramps).go(25)
+    walk.lock["steep_periods"] = STEEP_PERIODS
+    walk.go(1)
+    assert walk.codes()[:3] == ["DONE", "DONE", "TOO_STEEP"]
+    if rule is OnFailure.STOP:
+        assert EndReason(int(walk.guard["reason"][0])) is EndReason.PLAN_STOPPED
+        return
+    assert walk.codes()[3:7] == ["SKIPPED", "SKIPPED", "SKIPPED", "RUNNING"]
+    assert walk.lock["steep_periods"][0] == 0
+    before = walk.progress["level"][0]
+    assert before > 1.0
+    walk.go(35)
+    assert max(walk.levels[-1700:]) <= before  # back to the last level that was held, and down from there
+    assert walk.levels[-1] == 0.5
+
+
+def test_a_steep_backbone_makes_a_ramp_longer_and_no_lost_lock_of_it():
+    walk = Walk(Segment(SegmentKind.HOLD, -1, 1.0, 1.0), Segment(SegmentKind.RAMP, 0, 3.0, 300.0))
+    walk.lock["steep_slowing"] = 0.8
+    walk.go(1490)
+    assert walk.codes() == ["DONE", "RUNNING"]
+    assert walk.go(20).codes() == ["DONE", "DONE"]
+    assert walk.progress["waited_cycles"][0] == 0.0
+    assert walk.progress["slowed_cycles"][0] == pytest.approx(1200.0, abs=1.0)
+
+
 def test_a_waveform_is_played_again_from_its_transient_on():
     played = Excitation(1.0, waveform=0)
     segments = [
