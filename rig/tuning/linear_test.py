@@ -19,6 +19,7 @@ from rig.errors import ConfigurationError
 from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
 from rig.text.durations import duration
+from rig.tick.safety.layout import EndReason
 from rig.tuning.converter_bits import bits_force_n, periodic_beyond
 from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
@@ -36,6 +37,11 @@ MIN_COHERENCE = 0.9  # least coherence of a level chosen by the user, or of the 
 MAX_CREST_FACTOR = 4.0  # largest expected ratio of peak to RMS of a multisine's response
 MAX_DISTORTION = 0.005  # distortion relative to the linear response of the force
 OTHER = 2.0  # factor between the levels of a test and of a second one; chosen
+AFTER_TRIP = 0.25  # level after a first one that has tripped, over that one; chosen
+LIMITS = tuple(
+    reason.name.lower() for reason in (EndReason.FORCE_LIMIT, EndReason.RESPONSE_LIMIT, EndReason.DISPLACEMENT_LIMIT)
+)
+"""Ends of a run at a limit of force or motion."""
 SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)  # see `LevelSearch`; chosen
 
 
@@ -63,6 +69,8 @@ class LinearTest:
     """All levels that were played in the search, V RMS."""
     share_of_limits: float
     """Largest peak of output and channels relative to its limit."""
+    tripped: str = ""
+    """How the first level has tripped, after which a quarter of it was played; empty if it has not."""
 
     @property
     def other_levels_v(self) -> tuple[float, ...]:
@@ -117,6 +125,7 @@ def measure(
         bits_force_n=bits_force_n(bench, matrix, runs.force_beyond_n),
         levels_tried_v=tried,
         share_of_limits=runs.share_of_limits,
+        tripped=runs.tripped,
     )
 
 
@@ -143,6 +152,10 @@ def expected_duration(bench: Bench, *, by_the_clock: bool) -> str:
     )
 
 
+class _LimitError(TuningError):
+    """A multisine has tripped at a limit of force or motion."""
+
+
 class _Runs:
     """The multisines of a tuning, and the measurements of the last one."""
 
@@ -158,6 +171,9 @@ class _Runs:
     """Coherence of force and drive at the last coarse level."""
     share_of_limits: float
     """Largest peak relative to its limit there."""
+
+    tripped = ""
+    """How a first level has tripped; empty if it has not."""
 
     def __init__(self, series: MultisineSeries, bench_name: str, highest_hz: float | None) -> None:
         self.series, self.bench, self.name = series, series.bench, bench_name
@@ -192,8 +208,17 @@ class _Runs:
         return self.measured
 
     def listen(self, level_rms_v: float) -> Seen:
-        """Play a level with coarse lines, and evaluate how its responses stand out of the noise."""
-        self.at(level_rms_v, _coarse(self.bench), 1)
+        """Play a level with coarse lines, and evaluate how its responses stand out of the noise.
+
+        A first level that trips at a limit of force or motion is lowered once, to a quarter.
+        """
+        try:
+            self.at(level_rms_v, _coarse(self.bench), 1)
+        except _LimitError as error:
+            if self.tripped:
+                raise
+            self.tripped = str(error)
+            return Seen(False, SEARCH.safe_share / AFTER_TRIP)
         self.coherence = coherence_of(self.bench, self.measured)
         least = min(self.coherence)
         noise = math.sqrt(max(1.0 / max(least, 1e-9) - 1.0, 0.0) / (1.0 / GOOD_COHERENCE - 1.0))
@@ -210,7 +235,10 @@ def _ended_well(recording: Recording, level: float) -> None:
     end = recording.parts[-1].end
     text = "" if end is None else end["text"]
     if end is None or end["reason"] != "completed":
-        raise TuningError(f"multisine at {level:.4g} V RMS: {text}; recorded in {recording.path}")
+        at_limit = end is not None and end["reason"] in LIMITS
+        raise (_LimitError if at_limit else TuningError)(
+            f"multisine at {level:.4g} V RMS: {text}; recorded in {recording.path}"
+        )
     failed = [point for point in points_of(recording) if not point.accepted]
     if failed:
         raise TuningError(f"multisine at {level:.4g} V RMS: {failed[0].reason}; recorded in {recording.path}")

@@ -263,7 +263,7 @@ def _turned(turns_deg: Mapping[str, float]) -> list[str]:
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> list[str]:
-    out = []
+    out = [f"{test.tripped}; the search went on with a quarter of that level"] if test.tripped else []
     if test.distortion > MAX_DISTORTION:
         out.append(
             f"the multisine at {test.level_rms_v:.3g} V RMS shows {100.0 * test.distortion:.2g} % of nonlinear distortion: "

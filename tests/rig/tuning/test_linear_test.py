@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from rig.tuning import linear_test
-from rig.tuning.linear_test import LINES, REFINEMENT
+from rig.tuning.linear_test import AFTER_TRIP, LINES, REFINEMENT, SEARCH, _ended_well, _Runs
 from rig.tuning.plant import TuningError
 from tests.rig.rigs import bench_with
 
@@ -46,3 +46,30 @@ def test_a_rig_without_a_mode_is_refused_after_the_finer_lines(runs):
     with pytest.raises(TuningError, match=r"^no mode$"):
         linear_test._damping(runs, 0.02, damping_of)
     assert len(runs.played) == 1
+
+
+def _ended(reason):
+    return SimpleNamespace(parts=[SimpleNamespace(end={"reason": reason, "text": "it tripped"})], path="test.h5")
+
+
+def test_a_level_that_trips_at_a_limit_is_lowered_once(monkeypatch):
+    runs, played = _Runs(SimpleNamespace(bench=bench_with()), "magnet-beam", None), []
+
+    def at(level_rms_v, resolution_hz, realisations):
+        played.append(level_rms_v)
+        _ended_well(_ended("force_limit"), level_rms_v)
+
+    monkeypatch.setattr(runs, "at", at)
+    assert SEARCH.next_level(0.01, runs.listen(0.01)) == pytest.approx(AFTER_TRIP * 0.01)
+    assert "0.01 V RMS: it tripped" in runs.tripped
+    with pytest.raises(TuningError, match=r"0\.0025 V RMS: it tripped"):
+        runs.listen(0.0025)
+    assert played == [0.01, 0.0025]
+
+
+@pytest.mark.parametrize("reason", ["sensor_stuck", "stop_requested", "daq_timeout"])
+def test_what_else_ends_a_multisine_ends_the_tuning(monkeypatch, reason):
+    runs = _Runs(SimpleNamespace(bench=bench_with()), "magnet-beam", None)
+    monkeypatch.setattr(runs, "at", lambda level_rms_v, *_: _ended_well(_ended(reason), level_rms_v))
+    with pytest.raises(TuningError, match="it tripped"):
+        runs.listen(0.01)
