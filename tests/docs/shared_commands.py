@@ -11,7 +11,7 @@ from tests.sharing import made_once, shared_folder
 def run_shared(words: list[str]) -> Ended:
     """Run a command in the present folder, once for all pages where words and files tell all that it does.
 
-    These are ``rig run PLAN -o FILE`` on a shipped bench, and ``rig identify`` of recordings and models.
+    These are ``rig run PLAN -o FILE`` on a shipped bench, and ``rig identify``, ``plot``, ``export`` of recordings and models.
     """
     told = _told_by(words)
     if told is None or Path(words[-1]).exists():
@@ -31,9 +31,9 @@ def _told_by(words: list[str]) -> list[str] | None:
         case ["run", plan, "-o", _]:
             text = _plan_alone(plan)
             return None if text is None else [text]
-        case ["identify", *options, "-o", _] if not any(":" in one or one.endswith(".py") for one in options):
-            files = [Path(one) for one in options if one.endswith(".h5")]
-            if not all(one.is_file() for one in files):
+        case ["identify" | "plot" | "export", *options, "-o", _] if not any(":" in one for one in options):
+            files = [Path(one) for one in options if one.endswith(".h5") or Path(one).exists()]
+            if not all(one.is_file() and one.suffix == ".h5" for one in files):
                 return None  # whatever is said of it
             return [hashlib.sha256(one.read_bytes()).hexdigest() for one in files]
         case _:
@@ -44,12 +44,13 @@ def _plan_alone(plan: str) -> str | None:
     """The text of a plan in a file, empty for a shipped one; None where it names further files."""
     if not plan.endswith(".toml"):
         return ""
-    text = Path(plan).read_text(encoding="utf-8")
+    lines = Path(plan).read_text(encoding="utf-8").splitlines()
+    text = "\n".join(line for line in lines if not line.startswith("#"))
     return None if ".toml" in text or ":" in text else text
 
 
 class _FailedError(Exception):
-    """A command has ended with another status than 0."""
+    """A command has ended with another status than 0, or has written another file than it was asked for."""
 
     def __init__(self, ended: Ended) -> None:
         super().__init__(ended.err)
@@ -57,8 +58,9 @@ class _FailedError(Exception):
 
 
 def _run(words: list[str], folder: Path) -> None:
+    before = {Path(words[-1]), *Path().iterdir()}
     ended = run_command(*words)
-    if ended.status:
+    if ended.status or before != set(Path().iterdir()):
         raise _FailedError(ended)
     shutil.copy(words[-1], folder)
     for stream in ("out", "err"):

@@ -63,7 +63,8 @@ def running(script, output, points):
     command = [sys.executable, "-c", FORKED + script, str(output)]
     with subprocess.Popen(command, cwd=Path(__file__).parents[4]) as child:
         try:
-            wait_until(lambda: _holds(output, points) or child.poll() is not None, f"{points} points")
+            # each look reads the whole journal
+            wait_until(lambda: _holds(output, points) or child.poll() is not None, f"{points} points", every_s=0.1)
             assert child.poll() is None, "the run ended before it was to be stopped"
             yield child
         finally:
