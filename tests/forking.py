@@ -3,10 +3,9 @@
 A new interpreter needs most of a second of processor time for numpy, numba and the product before it does anything, and the
 tests start some hundreds. `install` lets `subprocess.Popen` hand over what `is_meant` for it to a server of this worker
 (`tests.forking_server`), whose child becomes a child of this process: its number, its parent, its streams, its signals and its
-status are those of a process that was started. joblib starts its workers by a function of its own, which does the same. What a
-new interpreter may differ in, or what is about it, starts one: `fresh`, another option or environment of Python's or a
-library's, and any other system than Linux. So does the first process of each kind in a run of the tests, which is then once
-what a user starts.
+status are those of a process that was started. What a new interpreter may differ in, or what is about it, starts one:
+`fresh`, another option or environment of Python's or a library's, and any other system than Linux. So does the first process of
+each kind in a run of the tests, which is then once what a user starts.
 """
 
 import atexit
@@ -19,24 +18,20 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
-
-from joblib.externals.loky.backend import fork_exec
-from joblib.parallel import ParallelBackendBase
 
 from tests.sharing import shared_folder
 
 ROOT = Path(__file__).parents[1]
-WORKER = "joblib.externals.loky.backend.popen_loky_posix"
 MODULES = tuple(
     place.replace("/", ".")  # as names they would be taken for what all tests depend on (`tests.changed`)
     for place in (
         *("rig/emulator", "rig/loop/worker", "rig/monitor", "rig/conformance/driving", "rig/recording/whole_read"),
         *("rig/monitor/folder_child", "rig/exchange/process"),
         *("tests/rig/emulator/host_process", "tests/rig/emulator/sound_host"),
-        *("tests/reliability/kills/scene", "tests/rig/recording/writer_process", WORKER),
+        *("tests/reliability/kills/scene", "tests/rig/recording/writer_process"),
     )
 )
 """What is forked of ``python -m``; so are the modules of `FOLDERS`."""
@@ -48,14 +43,11 @@ COMMANDS = (MAIN, f"import signal; signal.signal(signal.SIGINT, signal.default_i
 """Other programs that are."""
 PASSED_ON = ("VIBROLOCK_", "XDG_", "PYTEST_", "HOME", "PYTHONPATH", "TMPDIR", "DISPLAY", "DBUS_", "JACK_")
 """Beginnings of names of the environment that no library reads when it is loaded."""
-THREADS = (*ParallelBackendBase.MAX_NUM_THREADS_VARS, ParallelBackendBase.TBB_ENABLE_IPC_VAR)
-"""Names that joblib sets for its workers, so that they do not compete. In tests linear algebra has one thread anyway."""
 SUBREAPER = 36
 """PR_SET_CHILD_SUBREAPER of <sys/prctl.h>: orphans among the descendants become children of this process."""
 MOST_BYTES = 100_000
 
 _start: Callable[..., None] = subprocess.Popen._execute_child
-_start_worker: Callable[..., int] = fork_exec.fork_exec
 _server: dict[int, tuple[socket.socket, dict[str, str]]] = {}
 """By this process's number: a forked one has none of its parent's."""
 _is_fresh: list[bool] = []
@@ -66,7 +58,6 @@ def install() -> None:
     """Fork from now on, where this system can."""
     if sys.platform == "linux" and "VIBROLOCK_TESTS_FRESH" not in os.environ:
         subprocess.Popen._execute_child = _execute_child
-        fork_exec.fork_exec = _execute_worker
 
 
 @contextlib.contextmanager
@@ -118,61 +109,31 @@ def _is_ordinary(told: Mapping[str, Any]) -> bool:
     return all(told.get(name, value) == value for name, value in (usual | changed).items())
 
 
-def _execute_worker(line: list[str], passed: Iterable[int], env: Mapping[str, str] | None = None) -> int:
-    """Start a worker of joblib; return its number."""
-    process = None
-    if is_meant(line) and not _is_first(line):
-        wanted = {**os.environ, **(env or {})}
-        process = _forked(line[1:], wanted, Path(), (0, 1, 2), passed, free=THREADS)
-    return _start_worker(line, passed, env) if process is None else process
-
-
 def _fork(process: Any, told: Mapping[str, Any]) -> bool:
-    """Have it forked; False if it must be started."""
+    """Have it forked; False if it must be started, for its environment or size."""
+    server, environment = _the_server()
     wanted = dict(os.environ if told["env"] is None else told["env"])
+    differing = {name for name in wanted.keys() | environment.keys() if wanted.get(name) != environment.get(name)}
+    if any(not name.startswith(PASSED_ON) for name in differing):
+        return False
+    passed = sorted(told["pass_fds"])
     ours = [told["p2cread"], told["c2pwrite"], told["errwrite"]]
     streams = [number if fd == -1 else fd for number, fd in enumerate(ours)]
-    session = told["start_new_session"]
-    found = _forked(told["args"][1:], wanted, Path(told["cwd"] or ""), streams, told["pass_fds"], session=session)
-    if found is None:
+    try:
+        folder = Path(told["cwd"] or "").absolute()
+        order = pickle.dumps((told["args"][1:], wanted, str(folder), told["start_new_session"], [0, 1, 2, *passed]))
+    except (OSError, TypeError):
         return False
-    process.pid = found
+    if len(order) > MOST_BYTES or not folder.is_dir():
+        return False
+    with _one_at_a_time, _adopting():
+        socket.send_fds(server, [order], [*streams, *passed])
+        process.pid = int(server.recv(64))
     process._child_created = True
     process._close_pipe_fds(
         *(told[name] for name in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite"))
     )
     return True
-
-
-def _forked(
-    words: Sequence[str],
-    wanted: Mapping[str, str],
-    folder: Path,
-    streams: Sequence[int],
-    passed: Iterable[int],
-    *,
-    session: bool = False,
-    free: Sequence[str] = (),
-) -> int | None:
-    """The number of a process that was forked; None if it must be started, for its environment or size.
-
-    ``free``: further names of the environment that may differ.
-    """
-    server, environment = _the_server()
-    differing = {name for name in wanted.keys() | environment.keys() if wanted.get(name) != environment.get(name)}
-    if any(not name.startswith(PASSED_ON) and name not in free for name in differing):
-        return None
-    passed = sorted(map(int, passed))
-    try:
-        folder = folder.absolute()
-        order = pickle.dumps((words, dict(wanted), str(folder), session, [0, 1, 2, *passed]))
-    except (OSError, TypeError):
-        return None
-    if len(order) > MOST_BYTES or not folder.is_dir():
-        return None
-    with _one_at_a_time, _adopting():
-        socket.send_fds(server, [order], [*streams, *passed])
-        return int(server.recv(64))
 
 
 @contextlib.contextmanager

@@ -22,7 +22,7 @@ LOADED = tuple(
     for place in (
         *("numpy", "numba", "h5py", "serial", "pydantic", "rig", "rig/cli", "rig/cli/run", "rig/cli/slow_commands"),
         *("rig/emulator/process", "rig/emulator/settings", "rig/loop/worker/process", "rig/campaigns/running/runner"),
-        *("rig/drivers/wire", "joblib"),
+        "rig/drivers/wire",
     )
 )
 RUNS = tuple(place.replace("/", ".") for place in ("rig/campaigns/plans", "rig/campaigns/running/runner"))

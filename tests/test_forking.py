@@ -1,17 +1,13 @@
 """A forked process is to its parent what one that was started is."""
 
-import contextlib
 import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from joblib import Parallel, delayed
-from joblib.externals.loky import get_reusable_executor, reusable_executor
 
-from tests.forking import COMMANDS, FORKED, WORKER, _is_first, fresh, is_meant
+from tests.forking import COMMANDS, FORKED, _is_first, fresh, is_meant
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
 
@@ -90,26 +86,6 @@ def test_descriptors_are_passed_under_their_numbers():
     os.close(theirs)
     assert os.read(ours, 99) == b"here"
     os.close(ours)
-
-
-def worker_of(_):
-    """What a worker of joblib is to its parent, and whether it had the product before it was asked."""
-    return os.getppid(), str(Path.cwd()), os.environ["OMP_NUM_THREADS"], "rig.campaigns.running.runner" in sys.modules
-
-
-def test_workers_of_joblib_are_forked_and_end_as_started_ones_do(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    _is_first([sys.executable, "-m", WORKER])
-    for is_forked in (True, False):
-        get_reusable_executor().shutdown()
-        with contextlib.nullcontext() if is_forked else fresh():
-            found = set(Parallel(n_jobs=2)(delayed(worker_of)(k) for k in range(4)))
-        assert found == {(os.getpid(), str(tmp_path), "1", is_forked)}
-        executor = reusable_executor._executor
-        processes = [*executor._processes.values()]
-        assert processes
-        executor.shutdown()
-        assert {process.exitcode for process in processes} == {0}
 
 
 def test_what_an_interpreter_would_read_starts_one():
