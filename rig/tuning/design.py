@@ -160,16 +160,15 @@ class _Candidate:
         return self.loop.low_pass_rad_s * min(self.share / (1.0 + self.proportional), 0.5 * self.response_share)
 
 
-def steepest_backbone(loop: ControlLoop) -> tuple[float, float]:
-    """Return the softening and the hardening that the loop bears wherever a nonlinear structure may shift its frequency.
+def steepest_hardening(loop: ControlLoop) -> float:
+    """Return the hardening that the loop bears wherever a nonlinear structure may shift its frequency.
 
-    Both are the least of `controller.tuning.hardening_margins` over `SHIFTS`, and infinite where these differ by more than
+    It is the least of `controller.tuning.hardening_margins` over `SHIFTS`, and infinite where these differ by more than
     `ALIKE`: where the resonance crosses that of the exciter, linear theory foretells instability through which runs have gone.
     """
     plants = [loop.plant.at(frequency_rad_s=(1.0 + shift) * loop.plant.frequency_rad_s) for shift in SHIFTS]
-    borne = list(zip(*(hardening_margins(replace(loop, plant=plant)) for plant in plants), strict=True))
-    softening, hardening = (min(slopes) if max(slopes) <= ALIKE * min(slopes) else math.inf for slopes in borne)
-    return softening, hardening
+    borne = [hardening_margins(replace(loop, plant=plant))[1] for plant in plants]
+    return min(borne) if max(borne) <= ALIKE * min(borne) else math.inf
 
 
 def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candidate]:

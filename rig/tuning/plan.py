@@ -8,7 +8,7 @@ from textwrap import wrap
 from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.text.json_values import JsonValue
-from rig.tuning.design import Chosen, gains_of, steepest_backbone
+from rig.tuning.design import Chosen, gains_of, steepest_hardening
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
 from rig.tuning.plant import ChannelRatios
@@ -112,9 +112,12 @@ def plan_text(
 
 
 def _slopes(chosen: Chosen) -> list[str]:
-    text = "Softening and hardening, d ln(frequency)/d ln(level), that these gains bear"
-    slopes: list[JsonValue] = [significant(min(slope, GENTLE), 3) for slope in steepest_backbone(chosen.design.loop)]
-    return [*_comment(f"{text}: a ramp ends where the backbone is steeper."), _line("steepest_backbone", slopes)]
+    hardening = min(steepest_hardening(chosen.design.loop), GENTLE)
+    text = "Hardening, d ln(frequency)/d ln(level), that these gains bear, after the softening; a steeper backbone ends a ramp"
+    return [
+        *_comment(f"{text} ({GENTLE:g}: none does)."),
+        _line("steepest_backbone", [GENTLE, significant(hardening, 3)]),
+    ]
 
 
 def _harmonics(choice: HarmonicsChoice) -> list[str]:

@@ -126,7 +126,7 @@ def test_ramps_keep_the_phase_because_the_frequency_follows_the_points_before(be
 def steep(bench, tmp_path_factory):
     """The beam with a spring of seventh order and a heavier exciter, steeper at the top than any gains bear, and its plan."""
     options = OPTIONS | {
-        "exciter": OPTIONS["exciter"] | {"armature_mass_kg": 0.1},
+        "exciter": OPTIONS["exciter"] | {"armature_mass_kg": 0.05},
         "elements": [
             {"kind": "user", "at": "tip", "of": "deflection", "function": f"{forces.__name__}:odd_polynomial"}
             | {"parameters": [0.0, 0.0, 0.3 * STIFFNESS / (35.0 / 64.0 * 0.004**6)]}
@@ -148,7 +148,7 @@ def test_a_backbone_steeper_than_the_gains_bear_ends_in_order_below_its_top(stee
     assert "too-steep" in end["skipped"]
     slopes = np.diff(np.log(mode.modal_frequency_hz)) / np.diff(np.log(mode.amplitude_m))
     assert np.all(slopes < plan.controller.steepest_backbone[1])
-    assert slopes[-1] > 0.3 * plan.controller.steepest_backbone[1]  # no level that holds is left out for nothing
+    assert slopes[-1] > 0.2 * plan.controller.steepest_backbone[1]  # no level that holds is left out for nothing
 
 
 @pytest.mark.slow
