@@ -192,7 +192,7 @@ class SamplesTests(DriverUnderTest):
             daq.stop()
             daq.start(block)
             inputs = np.vstack([daq.exchange(np.zeros(block)) for _ in range(-(-5000 // block))])
-            rest_v = float(np.std(inputs[-1000:], axis=0).max())
+            rest_v = float(np.nanstd(inputs[-1000:], axis=0).max())  # a busy computer may have lost samples
             assert rest_v < self.tolerance_v, (
                 f"at 0 V the inputs are at {rest_v:.3g} V RMS: allowed is {self.tolerance_v:g} V"
             )
