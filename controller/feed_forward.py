@@ -13,9 +13,7 @@ BACKBONE = record(i8="points", f8="level level_1 omega_1 level_2 omega_2 level_3
 """The last levels held with a lock (one record). ``level_1``, ``omega_1`` (rad/s): the last of ``points`` up to three;
 ``level``: the level at the last sample, in the unit of the plan's levels."""
 
-MOST_POWER = (
-    6.0  # of the level by which its slope is foretold to grow; chosen: a cubic spring has 2, one of seventh order 6
-)
+MOST_POWER = 6.0  # of the level by which its slope is foretold to grow; chosen: a spring of seventh order has 6
 LARGEST_RATIO = 3.0  # of the slope to that between the last two levels: the parabola is not believed beyond
 NEAREST = 0.25
 """Part of a step of the level: levels nearer to each other tell no slope for that step, since noise would be multiplied."""

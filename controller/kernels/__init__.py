@@ -24,7 +24,11 @@ if TYPE_CHECKING:
         logarithmic_slope as logarithmic_slope,
         steepness as steepness,
     )
-    from controller.frequency import follow as follow, frequency_error as frequency_error
+    from controller.frequency import (
+        FREQUENCY_ERROR as FREQUENCY_ERROR,
+        follow as follow,
+        frequency_error as frequency_error,
+    )
     from controller.law import measure_phase as measure_phase
     from controller.lock import (
         LOCK as LOCK,

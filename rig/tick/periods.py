@@ -4,6 +4,7 @@ import math
 
 from controller.harmonics import end_harmonics_period, left_alone
 from controller.kernels import (
+    FREQUENCY_ERROR,
     LOCKED,
     RESPONSE,
     VOLTAGE,
@@ -92,12 +93,13 @@ def mind_backbone(t: TickArrays) -> None:
     """Slow an upward ramp, or give it up, by how steep the backbone is where the vibration is, and how steep it is foretold.
 
     In a ramp the vibration lags behind its level, and the oscillator behind the resonance: the slope is that of the resonance
-    over the amplitude, as the last period shows them.
+    over the amplitude, as the last period shows them; with the phase law that of the oscillator.
     """
     law, control, progress = t.law[0].frequency, t.control[0], t.progress[0]
-    period, omega = control.period, control.frequency.omega
-    compliance = law.mode_shape_squared * period.force_n / period.drive_m_s2
-    resonance = omega + frequency_error(period.error_rad, compliance, omega, progress.lag)
+    period, resonance = control.period, control.frequency.omega
+    if law.law == FREQUENCY_ERROR:  # the phase law may not know the mode shape, and allows a lag of 0
+        compliance = law.mode_shape_squared * period.force_n / period.drive_m_s2
+        resonance += frequency_error(period.error_rad, compliance, resonance, progress.lag)
     target = t.segments[progress.segment].level
     here = logarithmic_slope(control.backbone, period.held, target, resonance)
     ahead = foretold_slope(control.backbone, target)
@@ -123,7 +125,8 @@ def close_period(t: TickArrays) -> None:
         waits = progress.entered == 1 and waits_for_phase(progress, t.segments[progress.segment])
         next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad, waits)
         lock.steep_slowing = 0.0
-        if waits and present and amplitude.law == RESPONSE:
+        bounded = t.law[0].frequency.most_hardening > 0.0
+        if bounded and waits and present and amplitude.law == RESPONSE:
             mind_backbone(t)
     # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
     saturated = amplitude.output.saturation_sign != 0 and amplitude.law == VOLTAGE

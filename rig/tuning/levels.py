@@ -58,9 +58,6 @@ MAX_NONHARMONIC = 0.05
 where the force per volt is large, and add twice as much as if they were spread evenly."""
 NARROW_SPAN = 10.0  # span below which rounding may add more, and the plan accepts more
 ACCEPTED_QUIET = 0.15  # of the force's RMS: what a plan accepts where `MAX_NONHARMONIC` bounds its lowest level; chosen
-MOST_NONHARMONIC = (
-    0.2  # of the force's RMS: what rounding may be foreseen to add where a plan accepts `ACCEPTED_NONHARMONIC`
-)
 SHORT_SPAN = 4.0  # span below which the lowest level is no longer raised for a lower rounding; chosen
 RELAXED_NONHARMONIC, ACCEPTED_NONHARMONIC = (0.1, 0.15), 0.25
 """Of the force's RMS, below `NARROW_SPAN`: what rounding may add down to `SHORT_SPAN` and below it, and what the plan accepts;

@@ -37,7 +37,7 @@ MIN_COHERENCE = 0.9  # least coherence of a level chosen by the user, or of the 
 MAX_CREST_FACTOR = 4.0  # largest expected ratio of peak to RMS of a multisine's response
 MAX_DISTORTION = 0.005  # distortion relative to the linear response of the force
 OTHER = 2.0  # factor between the levels of a test and of a second one; chosen
-AFTER_TRIP = 0.25  # level after a first one that has tripped, over that one; chosen
+AFTER_TRIP = 0.25  # level of the search after one that has tripped, over that one; chosen
 LIMITS = tuple(
     reason.name.lower() for reason in (EndReason.FORCE_LIMIT, EndReason.RESPONSE_LIMIT, EndReason.DISPLACEMENT_LIMIT)
 )
@@ -70,7 +70,7 @@ class LinearTest:
     share_of_limits: float
     """Largest peak of output and channels relative to its limit."""
     tripped: str = ""
-    """How the first level has tripped, after which a quarter of it was played; empty if it has not."""
+    """How a level of the search has tripped, after which a quarter of it was played; empty if none has."""
 
     @property
     def other_levels_v(self) -> tuple[float, ...]:
@@ -173,7 +173,7 @@ class _Runs:
     """Largest peak relative to its limit there."""
 
     tripped = ""
-    """How a first level has tripped; empty if it has not."""
+    """How a level of the search has tripped; empty if none has."""
 
     def __init__(self, series: MultisineSeries, bench_name: str, highest_hz: float | None) -> None:
         self.series, self.bench, self.name = series, series.bench, bench_name
@@ -210,7 +210,7 @@ class _Runs:
     def listen(self, level_rms_v: float) -> Seen:
         """Play a level with coarse lines, and evaluate how its responses stand out of the noise.
 
-        A first level that trips at a limit of force or motion is lowered once, to a quarter.
+        A level that trips at a limit of force or motion is lowered once, to a quarter.
         """
         try:
             self.at(level_rms_v, _coarse(self.bench), 1)

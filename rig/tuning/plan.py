@@ -18,7 +18,7 @@ HARMONICS = 5  # harmonics that are evaluated; chosen
 AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
 MIN_TIMEOUT_PERIODS = 1000  # shortest time in which a point must settle, periods; chosen
 LOST_PERIODS = 20  # at least
-GENTLE = 1.0  # largest slope that is written: beyond, no backbone is steeper
+GENTLE = 1.0  # largest slope that is written: only a vibration that runs away is beyond it
 WAITING_DEG = 15.0  # error above which a ramp waits: the loops are quick
 
 
@@ -115,7 +115,7 @@ def _slopes(chosen: Chosen) -> list[str]:
     hardening = min(steepest_hardening(chosen.design.loop), GENTLE)
     text = "Hardening, d ln(frequency)/d ln(level), that these gains bear, after the softening; a steeper backbone ends a ramp"
     return [
-        *_comment(f"{text} ({GENTLE:g}: none does)."),
+        *_comment(f"{text} ({GENTLE:g}: no bound is known)."),
         _line("steepest_backbone", [GENTLE, significant(hardening, 3)]),
     ]
 
