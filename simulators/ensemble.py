@@ -36,8 +36,8 @@ def ensemble(
 ) -> Generator[tuple[str, Result], None, None]:
     """Yield ``(name, function(variant))`` for every variant, in their order, as results arrive.
 
-    Raises `VariantError`, naming the variant, if the function fails. After such an error, after Ctrl-C, or if the iterator is
-    closed early, variants that have not begun are dropped.
+    Raises `VariantError`, naming the variant, if the function fails. After such an error, or if the iterator is closed early,
+    the variants that the workers hold are waited for, at most two for each, and the others are dropped. Ctrl-C ends all.
 
     Parameters
     ----------

@@ -1,10 +1,17 @@
 """Calls in the workers of joblib, whose results are taken as they come; who has enough may stop."""
 
-import warnings
+import traceback
 from collections.abc import Callable, Generator, Iterable
-from typing import Any, TypeVar
+from itertools import takewhile
+from threading import Event
+from typing import Any, Generic, NamedTuple, TypeVar
 
 Result = TypeVar("Result")
+
+
+class _Outcome(NamedTuple, Generic[Result]):
+    result: Result | None
+    error: Exception | None
 
 
 def results_of(
@@ -12,15 +19,31 @@ def results_of(
 ) -> Generator[Result, None, None]:
     """Yield the results of calls (each a `joblib.delayed`), with the ``options`` of `joblib.Parallel`.
 
-    If the iterator is closed early, calls that have not begun are dropped. joblib then warns that work was lost; whoever closes
-    it has all that it needs.
+    If a call fails, its error is raised, with the worker's traceback as a note. After an error, or if the iterator is closed
+    early, no more calls are handed to the workers, and those that were are waited for: at most two for each worker. joblib
+    itself would kill the workers. They would have to be started again for what comes next, and a call that is handed over at
+    that moment ends the thread that manages them with an error. Ctrl-C while a result is waited for does kill them.
     """
     from joblib import Parallel  # only on use: it takes long to load
 
-    found = Parallel(**options)(calls)
+    enough = Event()
+    wanted = takewhile(lambda _: not enough.is_set(), calls)
+    found = Parallel(pre_dispatch="n_jobs", batch_size=1, **options)((_held, call, {}) for call in wanted)
     try:
-        yield from (one for one in found)  # which does not close it
+        for result, error in found:
+            if error is not None:
+                raise error
+            yield result
     finally:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", r".*\btasks\b", UserWarning)
-            found.close()
+        enough.set()
+        for _ in found:
+            pass
+
+
+def _held(function: Callable[..., Result], given: Any, named: Any) -> _Outcome[Result]:
+    """Return what a call returns or raises: an exception would let joblib kill the workers."""
+    try:
+        return _Outcome(function(*given, **named), None)
+    except Exception as error:
+        error.add_note(traceback.format_exc())
+        return _Outcome(None, error)

@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +52,21 @@ def test_results_are_named_by_counting_where_no_names_are_given() -> None:
 
 
 def test_who_has_enough_stops_without_a_warning() -> None:
-    found = ensemble(range(200), process, n_jobs=2)
+    found = ensemble(count(), process, n_jobs=2)
     next(found)
     found.close()  # warnings are errors in tests
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signal 0 ends a process there")
+def test_closing_it_or_a_failing_variant_keeps_the_workers() -> None:
+    found = ensemble(range(200), process, n_jobs=2)
+    _, worker = next(found)
+    found.close()
+    os.kill(worker, 0)
+    with pytest.raises(VariantError, match="ZeroDivisionError") as failed:
+        list(ensemble([1.0, 0.0] * 50, reciprocal, n_jobs=2))
+    os.kill(worker, 0)
+    assert "in reciprocal" in failed.value.__notes__[0]
 
 
 def test_backend_of_the_user_is_honoured() -> None:

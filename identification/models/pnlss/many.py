@@ -201,8 +201,8 @@ def identify_many(
 
     Notes
     -----
-    A failed job gives a result with its reason, and the others continue. After Ctrl-C, or if the iterator is closed early,
-    jobs that have not started are dropped. Raises `IdentificationError` if two jobs have the same name.
+    A failed job gives a result with its reason, and the others continue. If the iterator is closed early, jobs that the
+    workers hold are waited for, at most two for each, and the others are dropped; Ctrl-C ends all. Raises `IdentificationError` if two jobs have the same name.
     """
     given = list(jobs)
     names = [job.name for job in given]
@@ -212,7 +212,7 @@ def identify_many(
     left = [job for job in given if job.name not in done]
     calls = (delayed(_outcome)(identify, job) for job in left)
     # A worker holds its present job and one more, and results are yielded at once: memory does not grow with the study.
-    found = results_of(calls, n_jobs=n_jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)
+    found = results_of(calls, n_jobs=n_jobs, return_as="generator_unordered")
     with contextlib.closing(found):
         for count, result in enumerate(found, len(given) - len(left) + 1):
             if progress is not None:
