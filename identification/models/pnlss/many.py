@@ -202,7 +202,8 @@ def identify_many(
     Notes
     -----
     A failed job gives a result with its reason, and the others continue. If the iterator is closed early, jobs that the
-    workers hold are waited for, at most two for each, and the others are dropped; Ctrl-C ends all. Raises `IdentificationError` if two jobs have the same name.
+    workers hold are waited for, at most two for each, and the others are dropped; Ctrl-C ends all. Raises
+    `IdentificationError` if two jobs have the same name.
     """
     given = list(jobs)
     names = [job.name for job in given]
