@@ -94,7 +94,7 @@ def open_unchecked(path: Path) -> "h5py.File":
         raise RecordingError(f"{path}: cannot be opened: {why}") from error
     try:
         with reading(path):
-            check_attributes(file)
+            check_attributes(file.id)
             if file.attrs.get("format") != FORMAT:
                 raise RecordingError(f"{path}: not a file of vibrolock, but an HDF5 file of another program")
             check_schema(file.attrs.get("schema"), path)

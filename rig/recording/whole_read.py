@@ -27,7 +27,8 @@ def main(path: Path) -> dict[str, str | bool | int]:
     try:
         with open_unchecked(path) as file, reading(path):
             verdict["schema"] = int(file.attrs["schema"])
-            for item in objects_in(file):
+            for name, _ in objects_in(file):
+                item = file[name]
                 dict(item.attrs)
                 if hasattr(item, "shape"):
                     _read_all(item)

@@ -7,7 +7,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from joblib import parallel_config
@@ -17,9 +16,10 @@ from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
 from tests.refused import refused
 from tests.waiting import LONG_S, wait_until
+from vibrolock.content_cache import c_function
 
 
-@numba.cfunc("float64(float64, CPointer(float64))")
+@c_function("float64(float64, CPointer(float64))")
 def hardening(z: float, parameters: Any) -> float:
     return float(-parameters[0] * z**3)
 

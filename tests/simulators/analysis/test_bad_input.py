@@ -2,7 +2,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 
@@ -14,9 +13,10 @@ from simulators.virtual_rig import VirtualRig
 from tests.refused import refused
 from tests.simulators.analysis.rigs import one_mode
 from tests.simulators.references import ideal
+from vibrolock.content_cache import c_function
 
 
-@numba.cfunc("float64(float64, CPointer(float64))")
+@c_function("float64(float64, CPointer(float64))")
 def nan_beyond_ten_micrometres(z: float, parameters: Any) -> float:
     return math.nan if z > 1e-5 else 0.0
 

@@ -1,6 +1,5 @@
 """Harmonic balance where one harmonic has a closed form, and the energy that goes in and out."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -9,11 +8,12 @@ from simulators.analysis.harmonic_balance import constant_force_response, forced
 from simulators.analysis.site_forces import hysteresis_loops
 from tests.simulators.analysis.rigs import DAMPING_RATIO, FREQUENCY_HZ, SHAPE, one_mode
 from tests.simulators.references import ideal
+from vibrolock.content_cache import c_function
 
 W0 = 2 * np.pi * FREQUENCY_HZ
 
 
-@numba.cfunc("float64(float64, CPointer(float64))")
+@c_function("float64(float64, CPointer(float64))")
 def quadratic_drag(velocity, parameters):
     return -parameters[0] * velocity * abs(velocity)
 

@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
@@ -18,32 +17,33 @@ from simulators.sites.elements import Clearance, Cubic, Element, Magnet, User
 from simulators.virtual_rig import VirtualRig
 from tests.refused import refused
 from tests.simulators.references import ideal
+from vibrolock.content_cache import c_function
 
 MASS_KG = 0.5
 SIGNATURE = "float64(float64, CPointer(float64))"
 
 
-@numba.cfunc(SIGNATURE)
+@c_function(SIGNATURE)
 def cubic_of_a_user(z: float, parameters: Any) -> float:
     return -parameters[0] * z * z * z
 
 
-@numba.cfunc(SIGNATURE)
+@c_function(SIGNATURE)
 def drag(velocity: float, parameters: Any) -> float:
     return -parameters[0] * velocity * abs(velocity)
 
 
-@numba.cfunc("float64(float64)")
+@c_function("float64(float64)")
 def of_one_argument(z: float) -> float:
     return z
 
 
-@numba.cfunc(SIGNATURE)
+@c_function(SIGNATURE)
 def pushing_at_rest(z: float, parameters: Any) -> float:
     return 1.0 - z
 
 
-@numba.cfunc(SIGNATURE)
+@c_function(SIGNATURE)
 def undefined_at_rest(z: float, parameters: Any) -> float:
     return float(np.sqrt(z - 1.0))
 

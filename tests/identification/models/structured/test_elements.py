@@ -23,7 +23,7 @@ CHANNELS = (Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m/s2"
 NOISE = 0.002
 
 
-@njit
+@njit(cache=True)
 def accelerations(u, h, every, omega, zeta, b, spring, cubic, joint, stiffness, slip):  # pragma: no cover compiled
     """Modal accelerations at every ``every``-th step of the leapfrog rule, from rest."""
     n = omega.size
