@@ -43,16 +43,17 @@ class Followed(NamedTuple):
     path: Path
     note: str
 
-    def states(self, balance: DrivenBalance) -> SteadyStates:
+    def states(self, balance: DrivenBalance, *, stability: bool = True) -> SteadyStates:
         """Return the vibrations along the path."""
         path = self.path
-        return steady_states(balance, path.unknowns, path.parameter, path.direction * path.direction[0] > 0.0)
+        rising = path.direction * path.direction[0] > 0.0
+        return steady_states(balance, path.unknowns, path.parameter, rising, stability=stability)
 
-    def folds(self, balance: DrivenBalance) -> SteadyStates:
+    def folds(self, balance: DrivenBalance, *, stability: bool = True) -> SteadyStates:
         """Return the vibrations at which the frequency turns back."""
         path = self.path
         none = np.zeros(path.turning_parameter.size, dtype=bool)
-        return steady_states(balance, path.turning_unknowns, path.turning_parameter, none)
+        return steady_states(balance, path.turning_unknowns, path.turning_parameter, none, stability=stability)
 
 
 def sizes(balance: DrivenBalance, frequency_hz: float) -> Float:

@@ -125,18 +125,21 @@ def steady_states(
     frequency_hz: Float,
     statically_stable: NDArray[np.bool_],
     level: Float | None = None,
+    *,
+    stability: bool = True,
 ) -> SteadyStates:
     """Convert solutions (float[n, n_unknowns]) of a balance to vibrations.
 
     ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that are stable under slow changes. ``level``
-    (float[n]): level of each, 1 by default.
+    (float[n]): level of each, 1 by default. Without ``stability`` the multipliers are NaN, and what is statically stable counts
+    as stable.
     """
     levels = [1.0] * len(unknowns) if level is None else level.tolist()
     basis, count, harmonics = balance.basis, frequency_hz.size, balance.basis.harmonics + 1
     sizes = {"states": balance.n_states, "inputs": len(balance.inputs), "outputs": len(balance.outputs)}
     series = {name: np.zeros((count, harmonics, size), dtype=complex) for name, size in sizes.items()}
     found = np.zeros((count, balance.order), dtype=complex)
-    stable, losses = np.zeros(count, dtype=bool), list[Loss]()
+    losses = list[Loss]()
     use = {"states": np.zeros((count, balance.ranges)), "inputs": np.zeros((count, len(balance.inputs)))}
     fine = basis.at(2.0 * np.pi * np.arange(_FINE * harmonics) / (_FINE * harmonics))
     for k, (z, at_hz) in enumerate(zip(unknowns, frequency_hz.tolist(), strict=True)):
@@ -145,19 +148,15 @@ def steady_states(
         for name, part in parts.items():
             series[name][k] = harmonics_of(part)
         use["states"][k], use["inputs"][k] = balance.state_use(z, fine), balance.input_use(inputs, fine)
-        found[k] = balance.multipliers(z, at_hz, levels[k])
-        if not balance.drive.size:
-            loss = loss_of_stability(found[k], balance.angle(at_hz))
-        else:
-            loss = loss_of_stability(found[k], balance.angle(at_hz), real=False) if statically_stable[k] else "fold"
-        stable[k] = not loss
-        losses.append(loss)
+        multipliers = balance.multipliers(z, at_hz, levels[k]) if stability else None
+        found[k] = np.nan if multipliers is None else multipliers
+        losses.append(_loss(balance, multipliers, at_hz, bool(statically_stable[k])))
     return SteadyStates(
         frequency_hz=np.array(frequency_hz),
         **series,
         voltage_v=np.array([balance.drive.voltage(balance.own(z)) for z in unknowns], dtype=complex),
         multipliers=found,
-        stable=stable,
+        stable=np.array([not loss for loss in losses], dtype=bool),
         loss=tuple(losses),
         state_use=use["states"],
         input_use=use["inputs"],
@@ -214,3 +213,11 @@ class HarmonicResponse:
             notes=self.notes,
             complete=self.complete,
         )
+
+
+def _loss(balance: DrivenBalance, multipliers: Complex | None, frequency_hz: float, statically_stable: bool) -> Loss:
+    """Return how a vibration loses its stability; without multipliers only folds are seen."""
+    held = balance.drive.size > 0
+    if (held or multipliers is None) and not statically_stable:
+        return "fold"
+    return "" if multipliers is None else loss_of_stability(multipliers, balance.angle(frequency_hz), real=not held)

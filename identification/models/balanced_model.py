@@ -127,7 +127,8 @@ class BalancedModel(DynamicModel):
                 f"{low:.4g} or {high:.4g} Hz that can be reached from rest within {allowed:g} times its range",
                 field="force_n",
             )
-        states, folds = [each.states(balance) for each in found], [each.folds(balance) for each in found]
+        states = [each.states(balance, stability=request.stability) for each in found]
+        folds = [each.folds(balance, stability=request.stability) for each in found]
         every = states[0] if len(states) == 1 else states[0].joined(states[1])
         held = held_notes(self.driven, request.held, request.exciter, request.held_inputs)
         notes = (*held, *harmonics_notes(every), *self.range_notes(every), *loss_notes(every))

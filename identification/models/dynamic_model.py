@@ -38,7 +38,8 @@ class Limit(NamedTuple):
 class SteadyRequest:
     """A steady vibration under a constant excitation, as `identification.frequency_response` describes its parameters.
 
-    ``level`` is in newtons, or in volts if ``held`` is ``voltage``.
+    ``level`` is in newtons, or in volts if ``held`` is ``voltage``. ``stability``: whether a harmonic balance finds the
+    multipliers of each vibration, which takes a third of the time; otherwise they are NaN, and only folds count as unstable.
     """
 
     level: float
@@ -53,6 +54,7 @@ class SteadyRequest:
     samples: int | None = None
     points: int = POINTS
     largest_range_use: float = LARGEST_RANGE_USE
+    stability: bool = True
 
 
 class DynamicModel(ABC):

@@ -1,6 +1,7 @@
 """Steady responses of models of any kind: one function for each question, with one set of defaults."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
@@ -161,9 +162,10 @@ def response_band(
     found = dynamic_model(model)
 
     def respond(one: object, largest: float = _ANY_RANGE) -> SteadyPrediction:
-        return frequency_response(
-            one, force_n, force=force, exciter=exciter, points=found.band_points, largest_range_use=largest
-        )
+        drawn = dynamic_model(one)
+        options = {"force": force, "exciter": exciter, "points": found.band_points, "largest_range_use": largest}
+        request, band_hz = _request(drawn, force_n, ResponseOptions, options)
+        return drawn.frequency_response(replace(request, stability=False), band_hz)  # a band has no use for it
 
     band = band_of_responses(respond(one, largest_range_use) for one in found.draws(draws, seed))
     return found.with_what_is_open(band, respond(model, largest_range_use), respond)

@@ -17,6 +17,7 @@ from identification import (
     response_band,
     steady_state,
 )
+from identification.models.dynamic_model import SteadyRequest
 from tests.identification.models.modal.modes import duffing as modal_duffing
 from tests.identification.models.pnlss.steady.oscillators import RATE_HZ, oscillator, shaker
 from tests.identification.models.structured.steady.beams import smooth
@@ -133,6 +134,21 @@ def test_a_band_is_that_of_responses_of_draws():
     # twice the error that the fit left, and the amplitude of a mode whose damping is known falls with the frequency squared
     spread = 1.96 * band.peak_amplitude_std_m / frequency_response(fit, 0.02).peak().amplitude_m
     assert spread == pytest.approx(2.0 * fit.training_error + 1.96 * 2.0e-3, rel=0.2)
+
+
+def test_a_response_whose_stability_is_not_asked_for_is_the_same_with_its_folds():
+    model, force_n = CASES["structured"]
+    request = SteadyRequest(level=force_n, held="pure-sine")
+    asked, other = (
+        dynamic_model(model).harmonic_response(replace(request, stability=stability), (None, None))
+        for stability in (True, False)
+    )
+    np.testing.assert_array_equal(other.points.displacement_m, asked.points.displacement_m)
+    assert np.all(np.isnan(other.points.multipliers))
+    assert np.all(np.isfinite(asked.points.multipliers))
+    assert other.folds.frequency_hz.size == 2
+    assert set(other.points.loss) == {"", "fold"}
+    np.testing.assert_array_equal(other.points.stable, asked.points.stable)
 
 
 def test_what_has_no_covariance_is_not_drawn():
