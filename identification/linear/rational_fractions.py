@@ -37,6 +37,8 @@ _PRIOR = 0.25
 """Prior value of c, relative to the c of a mode at the highest line; c stays near it if the responses do not determine c."""
 _PRIOR_STD = 5.0
 """Standard deviation of the prior on c, relative to its value, in units of the error of the responses; a weak prior."""
+_AT_ONCE = 1024
+"""Lines that are summed at once: what is computed of them stays in the cache of a processor. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +87,14 @@ def modal_basis(s: Complex, poles: Float, normal: bool) -> Complex:
 def pole_derivatives(s: Complex, poles: Float, terms: Float, normal: bool) -> Complex:
     """complex[n_lines, n_outputs, 2 n_modes + 1]: derivatives of the accelerance with respect to the poles and c."""
     (omega, zeta), s = np.split(poles[:-1], 2), s[:, None, None]
-    count = omega.size
+    count, squared = omega.size, s * s
     numerator = terms[None, :, :count] + (0.0 if normal else terms[None, :, count : 2 * count] * s)
-    slope = -numerator * s**2 / (s**2 + 2.0 * zeta * omega * s + omega**2) ** 2
-    near = 1.0 + poles[-1] * s**2
-    upper = -terms[None, :, -2:-1] * s**4 / near**2 - 2.0 * terms[None, :, -1:] * s**5 / near**3
-    return np.concatenate([slope * (2.0 * zeta * s + 2.0 * omega), slope * 2.0 * omega * s, upper], axis=2)
+    resonance = 1.0 / (squared + 2.0 * zeta * omega * s + omega**2)
+    slope = -numerator * (squared * resonance * resonance)
+    near = 1.0 + poles[-1] * squared
+    nearest = squared / near
+    upper = -(terms[None, :, -2:-1] + 2.0 * terms[None, :, -1:] * (s / near)) * (nearest * nearest)
+    return np.concatenate([slope * (2.0 * zeta * s + 2.0 * omega), slope * (2.0 * omega * s), upper], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,46 +114,57 @@ class _Problem:
         self.data, self.normal, self.s = data, normal, data.s
         self.value = data.value[:, :, 0]
         self.precision = np.linalg.inv(data.smooth)
+        self.weighted = (self.precision @ data.value)[:, :, 0]
+        self.chunks = [slice(first, first + _AT_ONCE) for first in range(0, data.s.size, _AT_ONCE)]
         self.largest_c = _NEAREST / np.abs(data.s[-1]) ** 2
         self.prior_c = _PRIOR / np.abs(data.s[-1]) ** 2
 
     def state(self, poles: Float) -> _State:
-        outputs = self.value.shape[1]
         basis = modal_basis(self.s, poles, self.normal)
-        size = np.linalg.norm(basis, axis=0)
-        scaled = basis / size
-        terms_count = size.size
-        pairs = (np.conj(scaled)[:, :, None] * scaled[:, None, :]).reshape(self.s.size, -1)
-        linear = (self.precision.reshape(self.s.size, -1).T @ pairs).real
-        linear = linear.reshape(outputs, outputs, terms_count, terms_count).transpose(0, 2, 1, 3)
-        linear = linear.reshape(outputs * terms_count, -1)
-        weighted = np.einsum("kop,kp->ko", self.precision, self.value)
+        linear = self._of_terms(basis, self.precision)
         unit = 1.0 / np.sqrt(np.diag(linear))
-        known = (weighted.T @ np.conj(scaled)).real.ravel()
-        terms = unit * np.linalg.lstsq(linear * np.outer(unit, unit), unit * known, rcond=1e-15)[0]
-        terms = terms.reshape(outputs, -1) / size
-        misfit = self.value - basis @ terms.T
-        weighted = np.einsum("kop,kp->ko", self.precision, misfit)
-        slopes = pole_derivatives(self.s, poles, terms, self.normal)
-        heavy = self.precision @ slopes
-        poles_count = poles.size
-        matrix = np.empty((poles_count + known.size,) * 2)
-        matrix[:poles_count, :poles_count] = np.tensordot(np.conj(slopes), heavy, ((0, 1), (0, 1))).real
-        cross = np.tensordot(np.conj(basis), heavy, (0, 0)).real.transpose(1, 0, 2).reshape(known.size, poles_count)
-        matrix[poles_count:, :poles_count], matrix[:poles_count, poles_count:] = cross, cross.T
-        both = np.tile(size, outputs)
-        matrix[poles_count:, poles_count:] = linear * np.outer(both, both)
-        gradient = -np.tensordot(np.conj(slopes), weighted, ((0, 1), (0, 1))).real
-        cost = float(np.sum(np.conj(misfit) * weighted).real)
+        known = unit * (self.weighted.T @ np.conj(basis)).real.ravel()
+        terms = unit * np.linalg.lstsq(linear * np.outer(unit, unit), known, rcond=1e-15)[0]
+        terms = terms.reshape(-1, basis.shape[1])
+        matrix, gradient, cost = self._of_all(poles, terms, basis, linear, self.precision)
         width = _PRIOR_STD * self.prior_c
         off = (poles[-1] - self.prior_c) / width
         gradient[-1] += off / width
-        matrix[poles_count - 1, poles_count - 1] += 1.0 / width**2
+        matrix[poles.size - 1, poles.size - 1] += 1.0 / width**2
         return _State(terms, cost + off**2, matrix, gradient)
+
+    def _of_terms(self, basis: Complex, weights: Complex) -> Float:
+        """float[n, n]: ``Re sum J^H W J`` of the terms row by row, for Hermitian W, complex[n_lines, n_outputs, n_outputs]."""
+        outputs, count = weights.shape[1], basis.shape[1]
+        one, other = np.triu_indices(count)
+        upper = np.zeros((outputs * outputs, one.size))
+        for lines in self.chunks:
+            part = basis[lines]
+            upper += (weights[lines].reshape(len(part), -1).T @ (np.conj(part)[:, one] * part[:, other])).real
+        found, upper = np.empty((outputs, outputs, count, count)), upper.reshape(outputs, outputs, -1)
+        found[..., one, other], found[..., other, one] = upper, upper.swapaxes(0, 1)
+        return found.transpose(0, 2, 1, 3).reshape(outputs * count, -1)
+
+    def _of_all(
+        self, poles: Float, terms: Float, basis: Complex, linear: Float, weights: Complex
+    ) -> tuple[Float, Float, float]:
+        """Return ``Re sum J^H W J`` of poles and terms, the gradient by the poles of half ``Re sum e^H W e``, and that sum.
+
+        ``linear``: `_of_terms`. The misfit e is taken as one more column of the derivatives by the poles.
+        """
+        outputs, count = weights.shape[1], poles.size + 1
+        own, cross = np.zeros((count, count)), np.zeros((basis.shape[1], outputs * count))
+        for lines in self.chunks:
+            misfit = self.value[lines] - basis[lines] @ terms.T
+            columns = np.dstack([pole_derivatives(self.s[lines], poles, terms, self.normal), misfit])
+            heavy = weights[lines] @ columns
+            own += (np.conj(columns).reshape(-1, count).T @ heavy.reshape(-1, count)).real
+            cross += (np.conj(basis[lines]).T @ heavy.reshape(len(heavy), -1)).real
+        cross = cross.reshape(-1, outputs, count).transpose(1, 0, 2).reshape(-1, count)[:, :-1]
+        return np.block([[own[:-1, :-1], cross.T], [cross, linear]]), -own[:-1, -1], float(own[-1, -1])
 
     def fitted(self, poles: Float, state: _State, converged: bool) -> ModalFit:
         """Return the fit with the covariance of its parameters."""
-        outputs = self.value.shape[1]
         basis = modal_basis(self.s, poles, self.normal)
         unit = 1.0 / np.sqrt(np.diag(state.matrix))
         inverse = np.linalg.pinv(state.matrix * np.outer(unit, unit), rcond=1e-14, hermitian=True)
@@ -159,16 +174,33 @@ class _Problem:
         if self.data.covariance is None:
             covariance, residual = 0.5 * squares / (misfit.size * freedom) * inverse, np.nan
         else:
-            slopes = pole_derivatives(self.s, poles, state.terms, self.normal)
-            whole = np.einsum("op,kt->kopt", np.eye(outputs), basis).reshape(*misfit.shape, -1)
-            jacobian = np.concatenate([slopes, whole], axis=2) * unit
-            heavy = self.precision @ jacobian
-            filling = _filling(heavy, self.data.covariance, self.data.deviations)
+            filling = self._filling(poles, state.terms, basis, self.data.covariance) * np.outer(unit, unit)
             covariance = inverse @ filling @ inverse
             expected = np.einsum("kop,kpo->", self.precision, self.data.covariance).real
             residual = float(np.sqrt(squares / (freedom * expected)))
         covariance = covariance * np.outer(unit, unit)
         return ModalFit(poles, state.terms, 0.5 * (covariance + covariance.T), residual, converged)
+
+    def _filling(self, poles: Float, terms: Float, basis: Complex, covariance: Complex) -> Float:
+        """float[m, m]: covariance of the gradient of the fit, from that of the lines or the deviations of the records.
+
+        Deviations keep what the errors of lines have in common. Those of n records have n - 1 degrees of freedom, for which the
+        standard errors are enlarged so that 1.96 of them hold as much as Student's interval.
+        """
+        deviations = self.data.deviations
+        if deviations is None:
+            weights = self.precision @ covariance @ self.precision
+            return 0.5 * self._of_all(poles, terms, basis, self._of_terms(basis, weights), weights)[0]
+        from scipy.stats import t  # only on use: it takes long to load
+
+        records = deviations.shape[1]
+        weighted = deviations @ np.conj(self.precision)
+        slopes = pole_derivatives(self.s, poles, terms, self.normal)
+        by_poles = np.tensordot(weighted, np.conj(slopes), ((0, 2), (0, 1))).real
+        by_terms = np.tensordot(weighted, np.conj(basis), (0, 0)).real.reshape(records, -1)
+        single = np.hstack([by_poles, by_terms])
+        student = float(t.ppf(0.975, records - 1)) / 1.96
+        return np.asarray(single.T @ single * (student**2 * records / (records - 1)))
 
     def allowed(self, poles: Float) -> Float | None:
         """Return the poles with c clipped to its range; None if a frequency or damping ratio is out of its range."""
@@ -176,22 +208,6 @@ class _Problem:
         if np.any(poles[:count] <= 0.0) or np.any(np.abs(poles[count:-1]) >= 1.0):
             return None
         return np.append(poles[:-1], np.clip(poles[-1], 0.0, self.largest_c))
-
-
-def _filling(heavy: Complex, covariance: Complex, deviations: Complex | None) -> Float:
-    """float[m, m]: covariance of the gradient of the fit, from the covariance of the lines or the deviations of the records.
-
-    Deviations keep what the errors of lines have in common. Those of n records have n - 1 degrees of freedom, for which the
-    standard errors are enlarged so that 1.96 of them hold as much as Student's interval.
-    """
-    if deviations is None:
-        return np.asarray(0.5 * np.tensordot(np.conj(heavy), covariance @ heavy, ((0, 1), (0, 1))).real)
-    from scipy.stats import t  # only on use: it takes long to load
-
-    records = deviations.shape[1]
-    single = np.tensordot(deviations, np.conj(heavy), ((0, 2), (0, 1))).real
-    student = float(t.ppf(0.975, records - 1)) / 1.96
-    return np.asarray(single.T @ single * (student**2 * records / (records - 1)))
 
 
 def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS) -> ModalFit:
