@@ -113,7 +113,7 @@ class _Problem:
     def __init__(self, data: WeightedResponses, normal: bool) -> None:
         self.data, self.normal, self.s = data, normal, data.s
         self.value = data.value[:, :, 0]
-        self.precision = np.linalg.inv(data.smooth)
+        self.precision = np.asarray(np.linalg.inv(data.smooth), dtype=np.complex128)
         self.weighted = (self.precision @ data.value)[:, :, 0]
         self.chunks = [slice(first, first + _AT_ONCE) for first in range(0, data.s.size, _AT_ONCE)]
         self.largest_c = _NEAREST / np.abs(data.s[-1]) ** 2

@@ -124,7 +124,7 @@ def cut(section_at: Callable[[float], Section], force_n: float, lags_deg: Float,
         amplitude_std_m=np.sqrt(variances[:, 1]) * displacement,
         frequency_change_hz=np.abs(np.array(moved) - omega) / (2.0 * np.pi),
         amplitude_change=np.abs(np.expm1(fewer - amplitude)),
-        stable=_rising(section_at, target, lags_deg, amplitude),
+        stable=_rising(section_at, sections, target, lags_deg, amplitude),
         notes=(*missing, *several),
     )
 
@@ -153,12 +153,14 @@ def _nearest(roots: Float, known: float) -> float:
     return float(roots[np.argmin(np.abs(roots - known))] if np.isfinite(known) else np.max(roots))
 
 
-def _rising(section_at: Callable[[float], Section], target: float, lags_deg: Float, amplitude: Float) -> Any:
+def _rising(
+    section_at: Callable[[float], Section], sections: list[Section], target: float, lags_deg: Float, amplitude: Float
+) -> Any:
     """Return whether the frequency rises with the lag along the curve [n], by finite differences at every point."""
     rising = np.ones(lags_deg.size, dtype=np.bool_)
-    for k, (lag, known) in enumerate(zip(lags_deg, amplitude, strict=True)):
+    for k, (lag, here, known) in enumerate(zip(lags_deg.tolist(), sections, amplitude, strict=True)):
         ends = []
-        for section in (section_at(float(lag + step)) for step in (-_LAG_STEP_DEG, 0.0, _LAG_STEP_DEG)):
+        for section in (section_at(lag - _LAG_STEP_DEG), here, section_at(lag + _LAG_STEP_DEG)):
             u = _nearest(section.amplitudes_at(target), known)
             if np.isfinite(u):
                 ends.append(section.omega_at(u))

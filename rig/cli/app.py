@@ -19,7 +19,7 @@ from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
 from rig.cli.firmware import app as firmware_app
 from rig.cli.flags import with_flags
-from rig.cli.group import Group
+from rig.cli.group import Group, command_of
 from rig.cli.identify import app as identify_app
 from rig.cli.list import list_
 from rig.cli.monitor import monitor
@@ -84,7 +84,7 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # also print to a terminal that cannot show µ
     try:
         with waiting_for(arguments), compiling_is_said():
-            status = app(arguments, prog_name="rig", standalone_mode=False)
+            status = command_of(app)(arguments, prog_name="rig", standalone_mode=False)
         if status == STOPPED:  # typer turns Ctrl-C into this status without a message
             _complain("interrupted", STOPPED)
     except (KeyboardInterrupt, typer.Abort):

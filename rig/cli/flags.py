@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import typer
-from typer.main import get_command
 
+from rig.cli.group import command_of
 from rig.cli.studies import installed_command
 from vibrolock.errors import StatedError
 
@@ -29,7 +29,7 @@ def flags(app: typer.Typer, arguments: Sequence[str] = (), *, studies: bool = Tr
     Options of installed ``studies`` are among them if asked for, which imports the studies.
     """
     found: dict[str, str] = {}
-    waiting: list[Command] = [get_command(app)]
+    waiting: list[Command] = [command_of(app)]
     while waiting:
         command = installed_command(waiting.pop()) if studies else waiting.pop()
         inner = getattr(command, "commands", {})

@@ -1,11 +1,14 @@
 """A group of commands whose help shows the first paragraph of each command in full."""
 
+from functools import cache
 from typing import TYPE_CHECKING
 
+import typer
 from typer.core import TyperGroup
+from typer.main import get_command
 
 if TYPE_CHECKING:  # where the lowest version of typer that is allowed does not have them
-    from typer._click.core import Context
+    from typer._click.core import Command, Context
     from typer._click.formatting import HelpFormatter
 
 
@@ -19,3 +22,9 @@ class Group(TyperGroup):
             formatter.write_dl(
                 [(name, command.get_short_help_str(limit=1000)) for name, command in commands if command]
             )
+
+
+@cache
+def command_of(app: typer.Typer) -> "Command":
+    """Return an application as a command. It is made once for a process: that takes a third of what `rig show` does."""
+    return get_command(app)

@@ -1,6 +1,5 @@
 """Commands that the distribution of studies brings. It is looked for when one of them is called, or asked for its options."""
 
-from functools import cached_property
 from typing import Any
 
 import typer
@@ -12,7 +11,7 @@ from rig.system.studies import find_study, load_study
 class StudyCommand(TyperCommand):
     """A command in the place of the one that the studies bring: it runs that one, or says how to install the studies."""
 
-    @cached_property
+    @property
     def installed(self) -> TyperCommand:
         """The command that the studies bring; this one if they are not installed."""
         entry = find_study(str(self.name))

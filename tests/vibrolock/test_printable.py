@@ -81,7 +81,7 @@ def test_an_error_that_is_not_ours_is_one_printable_line_too(command, monkeypatc
     def failing(*_, **__):
         raise ValueError("bad\x1b[2J" + "x" * 100_000)
 
-    monkeypatch.setattr(import_module("rig.cli.app"), "app", failing)  # the package has an attribute of that name
+    monkeypatch.setattr(import_module("rig.cli.app"), "command_of", lambda _: failing)
     status, _, err = command("list")
     assert status == 1
     assert err.startswith(r"rig: unexpected ValueError: bad\x1b[2Jxxx")
