@@ -12,6 +12,7 @@ import os
 import platform
 import shutil
 import tomllib
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,10 @@ def changed(plan: Plan | str | Path, **changes: Any) -> Plan:
 
 
 def _make(path: Path, plan: Plan, bench: Bench, seed: int) -> None:
-    run_plan(plan, bench, path, RunOptions(seed=seed)).close()
+    with closing(run_plan(plan, bench, path, RunOptions(seed=seed))) as recording:
+        end = recording.parts[-1].end
+    if end is None or end["reason"] == "stop_requested":  # the tests are being ended
+        raise InterruptedError(f"{path}: the run was stopped; its recording is not kept for other tests")
     path.chmod(0o444)
 
 

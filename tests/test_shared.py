@@ -10,6 +10,7 @@ import pytest
 
 import rig
 import tests.recorded as store
+from rig.campaigns.running.runner import run_plan
 from rig.recording.reader import Recording
 from tests.recorded import SHORT, changed, recorded, recorded_at, recorded_run
 from tests.refused import refused
@@ -70,6 +71,19 @@ def test_a_recording_is_what_a_run_gives_and_is_made_once(tmp_path):
     ):
         made, found = (one.recording.parts[0].read(0, one.recording.n_rows) for one in (run, kept))
         assert made.tobytes() == found.tobytes()
+
+
+def test_a_recording_of_a_run_that_was_stopped_is_not_kept(tmp_path, monkeypatch):
+    def stopped(*given):
+        recording = run_plan(*given)
+        recording.parts[-1].end["reason"] = "stop_requested"
+        return recording
+
+    monkeypatch.setattr(store, "run_plan", stopped)
+    monkeypatch.setattr(store, "_state_folder", lambda: tmp_path)
+    with pytest.raises(InterruptedError):
+        recorded("magnet-beam/backbone", **SHORT)
+    assert [one.suffix for one in tmp_path.iterdir() if one.is_dir()] == [".unfinished"]
 
 
 def test_a_recording_is_read_only_and_a_copy_of_it_is_not(tmp_path):
