@@ -114,6 +114,9 @@ def close_period(t: TickArrays) -> None:
     if not end_period(period):
         return
     control.frequency.mean_error_rad = period.error_rad
+    guard = t.guard[0]
+    guard.near_periods = guard.near_periods + 1 if guard.near == 1 else 0
+    guard.near = 0
     if loop.drive in (Drive.WAVEFORM, Drive.SILENT):
         return
     present = control.vibration.present == 1
@@ -131,7 +134,7 @@ def close_period(t: TickArrays) -> None:
     # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
     saturated = amplitude.output.saturation_sign != 0 and amplitude.law == VOLTAGE
     locked = (open_loop or lock.state == LOCKED) and not saturated
-    period.output_v = t.guard[0].amplitude_v
+    period.output_v = guard.amplitude_v
     period.saturated, period.clamped = amplitude.saturated, control.frequency.clamped
     wanted = t.progress[0].level if amplitude.law != VOLTAGE else 0.0
     distortion = end_harmonics(t)

@@ -44,6 +44,8 @@ class TickSettings:
     """False keeps the output at 0 V."""
     start_judged: bool = False
     """Whether a start segment lasts until `Tick.release_start`, so that a caller can judge the vibration there."""
+    near_limits: float = 1.0
+    """Part of a limit of force or motion at which a level on its way up is given up; 1: none."""
     per_volt: tuple[float, float] | None = None
     """Force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts."""
 
@@ -86,7 +88,7 @@ class Tick:
         near_hz = bench.specimen.linear_frequency_hz
         smallest = [SMALLEST_BITS * c.resolution_in_unit for c in bench.channels]
         law_record["lock"] = law.lock.build(smallest[force], smallest[drive])
-        limits = limits_record(bench)
+        limits = limits_record(bench, settings.near_limits)
         if law.harmonics is not None:
             controlled = bench.channels[force if law.harmonics.channel == "force" else drive]
             law_record["harmonics"]["smallest"] = controlled.negligible_amplitude
@@ -123,7 +125,7 @@ class Tick:
             law=law_record,
             rule=settings.settle.build(),
             limits=limits,
-            inputs=input_records(bench),
+            inputs=input_records(bench, settings.near_limits),
             expected=expected,
             segments=table,
             waveforms=np.zeros((1, 1)) if waveforms is None else np.ascontiguousarray(waveforms, float),

@@ -42,6 +42,8 @@ class Quality(StrEnum):
     """The phase lock was lost."""
     TOO_STEEP = "too-steep"
     """The backbone became steeper than the gains bear."""
+    NEAR_LIMIT = "near-limit"
+    """Force or motion came near a limit of the bench."""
     NOT_LOCKED = "not-locked"
     """No phase lock was reached."""
     UNREACHABLE = "unreachable"

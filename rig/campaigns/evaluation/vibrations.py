@@ -29,6 +29,7 @@ WHY = {
     Outcome.DISTURBED: DISTURBED,
     Outcome.LOST_LOCK: "phase lock lost",
     Outcome.TOO_STEEP: "on the way the backbone becomes steeper than the gains bear (controller.steepest_backbone)",
+    Outcome.NEAR_LIMIT: "on the way force or motion comes near a limit of the bench (`near_limits` of the plan)",
     Outcome.UNREACHABLE: "out of reach: the output was at its voltage limit",
     Outcome.OUTSIDE_WINDOW: "the frequency was at an end of its window: another mode, or a resonance outside",
     Outcome.NOT_LOCKED: "the lock was lost and did not return",

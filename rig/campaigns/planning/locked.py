@@ -38,6 +38,9 @@ class LockedPlan(Levels, Plan):
     accepted_nonharmonic_force: float = Field(0.1, gt=0, le=1)
     """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted. Its cause is another
     mode or an oscillating control loop."""
+    near_limits: float = Field(1.0, gt=0, le=1)
+    """Part of the bench's limits of force, acceleration and displacement. A level that brings a channel beyond it in its ramp
+    up, or while it settles, is given up with those above it, as after a lost lock. With 1 only the limits themselves act."""
     on_failure: Literal["skip", "stop"] = "skip"
     """What follows a failed point: ``skip`` goes on with the next point, ``stop`` ramps down and ends the run."""
 

@@ -2,6 +2,7 @@
 
 from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
+from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 from rig.tick.sequencer.segments import Segment
 from rig.tick.tick import TickSettings
@@ -21,5 +22,6 @@ def tick_settings(
         plan.known_plant,
         plan.retries,
         start_judged=True,
+        near_limits=plan.near_limits if isinstance(plan, LockedPlan) else 1.0,
         per_volt=None if checked is None else (checked.newtons_per_volt, checked.acceleration_per_volt),
     )

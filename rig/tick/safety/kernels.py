@@ -66,6 +66,8 @@ def watch_input(
 @kernel
 def watch_limit(guard: Record, channel: Record, index: int, value: float, sample: int) -> None:
     """Check a force or acceleration: trip beyond its limit; drop the output if it grows far beyond during a trip's ramp."""
+    if abs(value) > channel.near:
+        guard.near = 1
     if abs(value) > channel.limit:
         reason = EndReason.FORCE_LIMIT if channel.role == FORCE else EndReason.RESPONSE_LIMIT
         if guard.mode == GuardMode.ARMED:
@@ -91,6 +93,8 @@ def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: flo
         shut_down(guard, EndReason.OVERTRAVEL, index, travel_m, sample, True)
     elif travel_m > limits.displacement_m:
         shut_down(guard, EndReason.DISPLACEMENT_LIMIT, index, travel_m, sample, False)
+    elif travel_m > limits.near_m:
+        guard.near = 1
 
 
 @kernel

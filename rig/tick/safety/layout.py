@@ -70,26 +70,29 @@ POLARITY_HINT = "is a sensor's polarity reversed, or the resonance outside the f
 """What to look for where a loop finds no lock."""
 
 LIMITS = record(
-    f8="voltage_v displacement_m lowest_rad_s highest_rad_s slew_v_per_sample integrator_gain integrator_leak "
+    f8="voltage_v displacement_m near_m lowest_rad_s highest_rad_s slew_v_per_sample integrator_gain integrator_leak "
     "resonance_rad_s",
     i8="overload_samples stuck_samples lost_samples ramp_down_samples",
 )
-"""Limits of a bench in samples and SI units (one record), and the resonance frequency that dominates the motion."""
+"""Limits of a bench in samples and SI units (one record), and the resonance frequency that dominates the motion. A displacement
+above ``near_m`` is near its limit."""
 
 INPUT = record(
-    f8="unit_per_volt overload_v alarm_v limit skew_samples stop_below_v stop_above_v",
+    f8="unit_per_volt overload_v alarm_v limit near skew_samples stop_below_v stop_above_v",
     i8="role watch_displacement emergency_stop",
 )
-"""Parameters of an input channel (one record a channel). A channel with ``emergency_stop`` is a switch: a reading outside
-``stop_below_v`` to ``stop_above_v`` drops the output. Otherwise its reading may stay constant."""
+"""Parameters of an input channel (one record a channel). A reading above ``near`` is near its ``limit``. A channel with
+``emergency_stop`` is a switch: a reading outside ``stop_below_v`` to ``stop_above_v`` drops the output. Otherwise its reading
+may stay constant."""
 
 INPUT_WATCH = record(f8="mean velocity displacement last_v", i8="same_samples overload_samples distrusted alert")
 """Running state of an input channel (one record a channel)."""
 
 GUARD = record(
-    i8="mode reason channel sample ramp_sample stop_requested dropped off_samples lock",
+    i8="mode reason channel sample ramp_sample stop_requested dropped off_samples lock near near_periods",
     f8="value ramp_from_v amplitude_v",
 )
 """State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once, for the first cause.
 ``off_samples``: samples since the output went off; ``dropped``: the output was dropped instead of ramped; ``lock``: lock state
-when a segment was cut short."""
+when a segment was cut short; ``near``: whether a reading of this period was near its limit; ``near_periods``: such periods in a
+row."""

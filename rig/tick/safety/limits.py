@@ -12,12 +12,12 @@ from rig.tick.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_H
 INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
 
 
-def limits_record(bench: Bench) -> np.ndarray:
-    """Return the limits in samples and SI units (one record of `LIMITS`)."""
+def limits_record(bench: Bench, near: float = 1.0) -> np.ndarray:
+    """Return the limits in samples and SI units (one record of `LIMITS`); ``near``: part of a limit that is near it."""
     limits, rate = bench.limits, bench.sample_rate_hz
     out = np.zeros(1, LIMITS)
     out["voltage_v"] = limits.voltage_v
-    out["displacement_m"] = limits.displacement_m
+    out["displacement_m"], out["near_m"] = limits.displacement_m, near * limits.displacement_m
     out["lowest_rad_s"], out["highest_rad_s"] = (2.0 * math.pi * f for f in limits.frequency_hz)
     out["slew_v_per_sample"] = limits.slew_v_per_s / rate
     out["overload_samples"] = max(1, round(limits.overload_s * rate))
@@ -30,8 +30,8 @@ def limits_record(bench: Bench) -> np.ndarray:
     return out
 
 
-def input_records(bench: Bench) -> np.ndarray:
-    """Return one record of `INPUT` for each channel: scaling, range, limit, skew."""
+def input_records(bench: Bench, near: float = 1.0) -> np.ndarray:
+    """Return one record of `INPUT` for each channel: scaling, range, limit, skew; ``near``: part of a limit that is near it."""
     out = np.zeros(len(bench.channels), INPUT)
     for record, channel in zip(out, bench.channels, strict=True):
         accelerates = channel.role in ("drive", "response")
@@ -39,7 +39,8 @@ def input_records(bench: Bench) -> np.ndarray:
         record["overload_v"] = bench.limits.overload_fraction * channel.range_v
         limits = {"force": bench.limits.force_n, "monitor": math.inf}
         record["limit"] = limits.get(channel.role, bench.limits.acceleration_m_s2)
-        record["alarm_v"] = min(record["overload_v"], record["limit"] * abs(channel.sensitivity_v_per_unit))
+        record["near"] = near * record["limit"]
+        record["alarm_v"] = min(record["overload_v"], record["near"] * abs(channel.sensitivity_v_per_unit))
         record["role"] = Role[channel.role.upper()]
         record["skew_samples"] = channel.skew_samples
         record["watch_displacement"] = accelerates

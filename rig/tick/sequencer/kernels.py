@@ -22,6 +22,7 @@ from vibrolock.compiled import Record, kernel
 
 LONGEST_WAIT = 1000.0  # periods of a ramp that waits for the phase, as long as a point may settle; chosen
 LONGEST_WAIT_FOR_HARMONICS = 300.0  # periods beyond its own that the start waits for the harmonics loop; chosen
+NEAR_PERIODS = 2  # in a row: a knock ends no ramp; chosen
 RETURN_PERIODS = 20.0  # of the way back to the last level with a lock
 FIRST_PERIODS = 0.01  # of a record, from which on its length in samples is foretold
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
@@ -71,15 +72,18 @@ def give_up(
 ) -> None:
     """Close a failed segment, then skip to the next point or end the run, as the plan demands.
 
-    The run also ends if the start segment fails, or if the loop has never locked and its phase or frequency is as far off as
-    with reversed feedback; the level is then not raised.
+    The run also ends if the start segment fails, if a limit is near before any level was held, or if the loop has never locked
+    and its phase or frequency is as far off as with reversed feedback; the level is then not raised.
     """
     segment = segments[progress.segment]
     elapsed = progress.cycle - progress.start_cycle
     close_segment(progress, outcomes, settling, failure)
     far_off = failure == Outcome.OUTSIDE_WINDOW or was_always_far(lock, elapsed)
-    lost = failure == Outcome.LOST_LOCK or failure == Outcome.TOO_STEEP
-    if segment.kind == SegmentKind.START or (progress.unlocked == 1 and segment.drive == Drive.LOOP and far_off):
+    lost = failure in (Outcome.LOST_LOCK, Outcome.TOO_STEEP, Outcome.NEAR_LIMIT)
+    if failure == Outcome.NEAR_LIMIT and progress.kept_level == 0.0:
+        progress.finished = 1
+        shut_down(guard, EndReason.PLAN_STOPPED, -1, 0.0, progress.sample, False)
+    elif segment.kind == SegmentKind.START or (progress.unlocked == 1 and segment.drive == Drive.LOOP and far_off):
         progress.finished = 1
         reason = EndReason.NO_LOCK_IN_WINDOW if failure == Outcome.OUTSIDE_WINDOW else EndReason.NO_LOCK
         shut_down(guard, reason, -1, 0.0, progress.sample, False)
@@ -183,6 +187,13 @@ def is_held_by_window(progress: Record, segment: Record, settling: Record) -> bo
 
 
 @kernel
+def comes_near_a_limit(progress: Record, segment: Record, guard: Record) -> bool:
+    """Return whether a level above the last one that was held, on its way or not yet settled, brings a reading near a limit."""
+    rises = progress.kept_level < segment.level and segment.drive == Drive.LOOP
+    return bool(rises and guard.near_periods >= NEAR_PERIODS)
+
+
+@kernel
 def has_returned(progress: Record, cycle: float) -> bool:
     """Lower the level to where a lock was last held; return whether it is there, where the ramp then begins."""
     done = min((cycle - progress.start_cycle) / RETURN_PERIODS, 1.0)
@@ -256,6 +267,8 @@ def step_ramp(
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.UNREACHABLE)
     elif lock.steep_periods >= STEEP_PERIODS:
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.TOO_STEEP)
+    elif comes_near_a_limit(progress, segment, guard):
+        give_up(progress, segments, outcomes, settling, lock, guard, Outcome.NEAR_LIMIT)
     elif progress.waited_cycles >= LONGEST_WAIT or (lock.state == LOST and waits_for_phase(progress, segment)):
         give_up(progress, segments, outcomes, settling, lock, guard, Outcome.LOST_LOCK)
 
@@ -322,11 +335,16 @@ def advance(
         return
     if segment.kind == SegmentKind.SETTLE or segment.kind == SegmentKind.RECORD:
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
+        if segment.kind == SegmentKind.SETTLE and comes_near_a_limit(progress, segment, guard):
+            failure = Outcome.NEAR_LIMIT
         if failure == Outcome.DISTURBED and measure_again(progress, segments, outcomes, settling, Outcome.DISTURBED):
             return
         if failure != Outcome.RUNNING:
             give_up(progress, segments, outcomes, settling, lock, guard, failure)
             return
+    if segment.kind == SegmentKind.START and comes_near_a_limit(progress, segment, guard):
+        give_up(progress, segments, outcomes, settling, lock, guard, Outcome.NEAR_LIMIT)
+        return
     if segment.kind == SegmentKind.START and elapsed >= segment.periods:
         verdict = start_verdict(settling, lock, elapsed)
         if verdict == Outcome.DONE and lock.state == LOCKED and wants_harmonics(segment, settling, elapsed):

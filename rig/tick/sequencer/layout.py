@@ -74,6 +74,8 @@ class Outcome(IntEnum):
     """The device went on by itself for too many samples, because outputs came too late."""
     TOO_STEEP = 14
     """On the way to its level the backbone became steeper than the gains bear."""
+    NEAR_LIMIT = 15
+    """On the way to its level force or motion came near a limit."""
 
 
 class OnFailure(IntEnum):

@@ -11,7 +11,7 @@ from controller.kernels import LOCK, PERIOD, STEEP_PERIODS
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import guard_record
 from rig.tick.sequencer.judgement import SETTLING, forget_periods, judge_period
-from rig.tick.sequencer.kernels import advance
+from rig.tick.sequencer.kernels import NEAR_PERIODS, advance
 from rig.tick.sequencer.layout import PROGRESS, OnFailure, Outcome, SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule, segment_table
 
@@ -493,7 +493,9 @@ def test_a_plan_without_retries_tries_nothing_again_however_much_better_it_becam
     assert _refused(walk) == []
 
 
-@pytest.mark.parametrize("outcome", ["NOT_SETTLED", "LOST_LOCK", "TOO_STEEP", "UNREACHABLE", "OUTSIDE_WINDOW"])
+@pytest.mark.parametrize(
+    "outcome", ["NOT_SETTLED", "LOST_LOCK", "TOO_STEEP", "NEAR_LIMIT", "UNREACHABLE", "OUTSIDE_WINDOW"]
+)
 def test_what_does_not_pass_is_not_repeated(outcome):
     skips = OnFailure.SKIP, OnFailure.SKIP
     walk = _recording(3, *_point(0, 1.0, *skips), *_point(1, 2.0))
@@ -508,6 +510,9 @@ def test_what_does_not_pass_is_not_repeated(outcome):
     elif outcome == "TOO_STEEP":
         walk = Walk(*_point(0, 1.0, *skips), *_point(1, 2.0))
         walk.lock["steep_periods"] = STEEP_PERIODS
+    elif outcome == "NEAR_LIMIT":
+        walk = Walk(*_point(0, 1.0, *skips), *_point(1, 2.0))
+        walk.progress["kept_level"], walk.guard["near_periods"] = 0.5, NEAR_PERIODS
     elif outcome == "UNREACHABLE":
         walk.settling["saturated_periods"] = 20
     else:
@@ -517,17 +522,22 @@ def test_what_does_not_pass_is_not_repeated(outcome):
     assert _refused(walk) == []
 
 
+@pytest.mark.parametrize("outcome", ["TOO_STEEP", "NEAR_LIMIT"])
 @pytest.mark.parametrize("rule", [OnFailure.SKIP, OnFailure.STOP])
-def test_a_backbone_that_becomes_too_steep_leaves_out_the_level_and_what_is_above(rule):
+def test_a_ramp_that_is_given_up_leaves_out_the_level_and_what_is_above(rule, outcome):
     ramps = [
         Segment(kind, number, level, 10.0, on_lost_lock=rule)
         for number, level in ((0, 1.0), (1, 2.0), (2, 3.0), (3, 0.5))
         for kind in (SegmentKind.RAMP, SegmentKind.HOLD)
     ]
     walk = Walk(*ramps).go(25)
-    walk.lock["steep_periods"] = STEEP_PERIODS
+    if outcome == "TOO_STEEP":
+        walk.lock["steep_periods"] = STEEP_PERIODS
+    else:
+        walk.guard["near_periods"] = NEAR_PERIODS
     walk.go(1)
-    assert walk.codes()[:3] == ["DONE", "DONE", "TOO_STEEP"]
+    walk.guard["near_periods"] = 0  # the level falls
+    assert walk.codes()[:3] == ["DONE", "DONE", outcome]
     if rule is OnFailure.STOP:
         assert EndReason(int(walk.guard["reason"][0])) is EndReason.PLAN_STOPPED
         return
@@ -538,6 +548,28 @@ def test_a_backbone_that_becomes_too_steep_leaves_out_the_level_and_what_is_abov
     walk.go(35)
     assert max(walk.levels[-1700:]) <= before  # back to the last level that was held, and down from there
     assert walk.levels[-1] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("after", "kept", "then", "outcomes"),
+    [
+        (5, 0.5, SegmentKind.SETTLE, ["NEAR_LIMIT", "SKIPPED"]),
+        (5, 0.0, SegmentKind.SETTLE, ["NEAR_LIMIT", "PENDING"]),  # nothing was held below: the run ends
+        (12, 0.0, SegmentKind.START, ["DONE", "NEAR_LIMIT"]),
+        (5, 1.0, SegmentKind.SETTLE, ["RUNNING", "PENDING"]),  # a level that was held once
+        (12, 0.5, SegmentKind.SETTLE, ["DONE", "NEAR_LIMIT"]),
+        (12, 0.5, SegmentKind.RECORD, ["DONE", "RUNNING"]),  # what is measured is finished
+    ],
+)
+def test_a_level_near_a_limit_is_given_up_in_its_ramp_and_until_it_settles(after, kept, then, outcomes):
+    kinds = (SegmentKind.RAMP, then)
+    walk = Walk(*(Segment(kind, 0, 1.0, 10.0, on_lost_lock=OnFailure.SKIP) for kind in kinds))
+    walk.progress["kept_level"] = kept
+    walk.go(after)
+    walk.guard["near_periods"] = NEAR_PERIODS
+    assert walk.go(1).codes() == outcomes
+    stopped = walk.guard["reason"][0] == EndReason.PLAN_STOPPED
+    assert stopped == ("NEAR_LIMIT" in outcomes and kept == 0.0)
 
 
 def test_a_steep_backbone_makes_a_ramp_longer_and_no_lost_lock_of_it():
