@@ -8,6 +8,7 @@ import numpy as np
 from controller.tuning.laws import ComplexResponseLaw, PhaseLaw
 from controller.tuning.loop import ControlLoop
 from controller.tuning.plant import PlantModel
+from controller.tuning.stability import LARGEST_AT_HALF
 from vibrolock.arrays import Complex, Float
 from vibrolock.errors import InputError
 
@@ -22,6 +23,7 @@ def exact_phase_law(
 
     For a given ratio kp/ki the bound ``|1 + g L| >= 1/sensitivity_peak`` is quadratic in the gain g at each frequency. The
     smallest positive root over all frequencies is the largest gain. As g = 0 is stable, every gain below it is stable too.
+    Where no frequency bounds it, as with much damping, the loop gain at half the frequency does (`LARGEST_AT_HALF`).
     The ratio kp/ki is found by a grid and a bounded scalar search.
     """
     from scipy.optimize import minimize_scalar
@@ -73,9 +75,13 @@ def frequencies_for(plant: PlantModel, n: int = 1500) -> Float:
 
 
 def _largest_gain(loop_gain: Complex, sensitivity_peak: float) -> float:
-    """Return the largest g for which ``|1 + g L| >= 1/sensitivity_peak`` holds for all gains from 0 to g."""
+    """Return the largest g for which ``|1 + g L| >= 1/sensitivity_peak`` holds for all gains from 0 to g.
+
+    The gain at the last frequency is at most `LARGEST_AT_HALF`.
+    """
     size = np.abs(loop_gain) ** 2
     half = loop_gain.real / size
     inside = half**2 - (1.0 - sensitivity_peak**-2) / size
     meets = (half < 0.0) & (inside >= 0.0)
-    return float(np.min(-half[meets] - np.sqrt(inside[meets]), initial=np.inf))
+    quickest = LARGEST_AT_HALF / float(np.abs(loop_gain[-1]))
+    return float(np.min(-half[meets] - np.sqrt(inside[meets]), initial=quickest))

@@ -41,12 +41,20 @@ class Margins:
 
 
 def unstable_poles(loop: ControlLoop) -> int:
-    """Return the number of closed-loop poles in the right half plane, by the argument principle."""
+    """Return the number of closed-loop poles in the right half plane, by the argument principle.
+
+    A rig without control is stable. A growing pole of the plant's model beyond the band of its fit belongs to the fit alone: it
+    is not counted, for the loop of the rig is closed on what was measured. A loop whose gain there is so high that the model's
+    pole moves counts as unstable.
+    """
     omega = loop.omega_rad_s
     radius = REACH * omega
-    offsets = loop.plant.poles_rad_s - 1j * omega
-    known = 2 * int(np.sum((offsets.real > INSET * omega) & (np.abs(offsets) < radius)))
-    return _windings(loop.determinant, INSET * omega, radius) + known
+    poles = loop.plant.poles_rad_s
+    offsets = poles - 1j * omega
+    lowest, highest = (2.0 * math.pi * hertz for hertz in loop.plant.band_hz)
+    measured = (poles.imag >= lowest) & (poles.imag <= highest)
+    known = 2 * int(np.sum(measured & (offsets.real > INSET * omega) & (np.abs(offsets) < radius)))
+    return abs(_windings(loop.determinant, INSET * omega, radius) + known)
 
 
 def changes_of_hardening(plant: PlantModel, lag_deg: float = -90.0) -> SlowChanges:

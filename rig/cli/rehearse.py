@@ -27,8 +27,8 @@ def rehearse_(
         typer.Option(
             "--from",
             metavar="FILE",
-            help="What is known of the rig: a recording of rig tune, rig check or any multisine, linear modes, an exciter, a "
-            "nonlinear mode; may be given several times.",
+            help="What is known of the rig: a recording of rig tune, rig check, any multisine or a backbone, linear modes, "
+            "an exciter, a nonlinear mode; may be given several times.",
         ),
     ] = None,
     exact: Annotated[bool, typer.Option("--exact", help="A virtual bench is its own twin, with other seeds.")] = False,

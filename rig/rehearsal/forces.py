@@ -18,6 +18,8 @@ cfunction = c_function("float64(float64, CPointer(float64))")
 BOUND = 0.5  # displacement at which a softening spring begins to stop softening, over the highest one; chosen
 OF_POWER = {2: 3.0 / 4.0, 4: 5.0 / 8.0, 6: 35.0 / 64.0}
 """Describing function of ``x^(p + 1)`` at unit amplitude, by the power p."""
+TABLE_REACH, TABLE_NODES = 1.5, 129
+"""Deflection that a table reaches over the largest amplitude, and its nodes on either side; chosen: 1 % of it apart."""
 Element = dict[str, object]
 """Table of an element of a virtual rig, as in its file."""
 
@@ -41,8 +43,19 @@ drag = velocity_damping
 
 @cfunction
 def odd_polynomial(x: float, parameters: Sequence[float]) -> float:
-    """Force of a spring: k3 x^3 + k5 x^5 + k7 x^7."""
+    """Force of a spring: k3 x^3 + k5 x^5 + k7 x^7. Twins that earlier versions have written use it."""
     square = x * x
+    return -(parameters[0] + (parameters[1] + parameters[2] * square) * square) * square * x
+
+
+@cfunction
+def scaled_polynomial(x: float, parameters: Sequence[float]) -> float:
+    """Force of a spring with stiffnesses that add up at a displacement a: (k3 (x/a)^2 + k5 (x/a)^4 + k7 (x/a)^6) x.
+
+    Coefficients of the seventh power of metres would exceed what an element takes where amplitudes are micrometres.
+    """
+    ratio = x / parameters[3]
+    square = ratio * ratio
     return -(parameters[0] + (parameters[1] + parameters[2] * square) * square) * square * x
 
 
@@ -58,11 +71,10 @@ def hardening_for(at: str, stiffness_n_m: float, amplitude_m: float, power: int 
 
     A force ``k3 x^3`` adds ``3/4 k3 a^2``, ``k5 x^5`` adds ``5/8 k5 a^4``, and ``k7 x^7`` adds ``35/64 k7 a^6``.
     """
-    coefficient = stiffness_n_m / (OF_POWER[power] * amplitude_m**power)
     if power == 2:
-        return {"kind": "cubic", "at": at, "stiffness_n_m3": coefficient}
-    return user_element(
-        at, odd_polynomial.__name__, "deflection", [coefficient if power == each else 0.0 for each in OF_POWER]
+        return {"kind": "cubic", "at": at, "stiffness_n_m3": stiffness_n_m / (OF_POWER[2] * amplitude_m**2)}
+    return polynomial_spring(
+        at, [stiffness_n_m / OF_POWER[each] if power == each else 0.0 for each in OF_POWER], amplitude_m
     )
 
 
@@ -78,6 +90,31 @@ def damping_for(at: str, damping_n_s_m: float, velocity_m_s: float) -> Element:
     return user_element(
         at, velocity_damping.__name__, "velocity", [damping_n_s_m * 3.0 * math.pi / (8.0 * velocity_m_s), 0.0]
     )
+
+
+def polynomial_spring(at: str, stiffnesses_n_m: Sequence[float], amplitude_m: float) -> Element:
+    """Return a spring of force ``(k3 (x/a)^2 + k5 (x/a)^4 + k7 (x/a)^6) x``, with k in N/m at the amplitude a (m)."""
+    return user_element(at, scaled_polynomial.__name__, "deflection", [*stiffnesses_n_m, amplitude_m])
+
+
+def spring_through(at: str, amplitudes_m: Float, stiffness_n_m: Float) -> Element:
+    """Return a spring that adds a stiffness (N/m) at each of some rising amplitudes (m), and none below the first.
+
+    Its force is piecewise linear: behind a gap g a slope k adds ``k (1 - 2/pi (asin r + r sqrt(1 - r^2)))`` with r = g/a at
+    amplitudes above g (Gelb and Vander Velde, 1968), and each measured amplitude is the gap of what the next one shows.
+    """
+    gaps = amplitudes_m[:-1]
+    ratio = np.minimum(gaps[None, :] / amplitudes_m[1:, None], 1.0)
+    added = 1.0 - 2.0 / math.pi * (np.arcsin(ratio) + ratio * np.sqrt(1.0 - ratio**2))
+    slopes = np.linalg.solve(added, stiffness_n_m[1:])
+    half = np.linspace(0.0, TABLE_REACH * amplitudes_m[-1], TABLE_NODES)
+    force = np.maximum(half[:, None] - gaps, 0.0) @ slopes
+    return {
+        "kind": "force-table",
+        "at": at,
+        "deflection_m": [*-half[:0:-1], *half],
+        "force_n": [*-force[:0:-1], *force],
+    }
 
 
 def user_element(at: str, name: str, of: str, parameters: Sequence[float]) -> Element:

@@ -8,12 +8,22 @@ import scipy
 from numpy.typing import NDArray
 
 from controller.tuning import PlantModel
-from identification import Exciter, LinearModes, ModalAnalysis, NonlinearMode, best_linear_approximation
+from identification import (
+    Backbone,
+    Exciter,
+    IdentificationError,
+    LinearModes,
+    ModalAnalysis,
+    NonlinearMode,
+    best_linear_approximation,
+    nonlinear_mode,
+)
 from rig.bench import Bench
+from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
-from rig.measurements import spectra
+from rig.measurements import backbone, spectra
 from rig.recording.reader import Recording
 from rig.rehearsal.linear.fit import posterior
 from rig.rehearsal.linear.model import Prior, Responses
@@ -21,6 +31,13 @@ from rig.rehearsal.linear.posterior import Posterior
 from vibrolock.arrays import Float
 
 BAND = (0.5, 2.2)  # band in which the linear rig is fitted, over the linear frequency; chosen
+NARROWER = (0.65, 1.6)
+"""Band that is taken where the wider one shows modes at its edge that a fit does not find; chosen."""
+OTHER_MODE = 0.1  # of the frequency: a backbone further off is of another mode or bench; chosen, as in a tuning
+POOR_INFLATION = 10.0  # misfit of a fit over its expectation from which the narrower band is tried; chosen
+KNOWN_LOG_STD = {"frequency_hz": 0.01, "damping_ratio": 0.5, "drive_shape": 0.2}
+"""Standard deviations of the logarithms of a mode that the plan's ``[plant]`` names: wide, for its responses are fitted anew;
+chosen so that no mode beside it takes its place."""
 LINES = 400  # largest number of lines of a fit; chosen: more take time and narrow nothing
 AVERAGED_LINES = 15
 """Lines over which variances are averaged; chosen: those of a few realisations scatter by themselves."""
@@ -64,15 +81,17 @@ class _Evidence:
 def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -> Knowledge:
     """Collect what the plan's ``[plant]`` and the ``sources`` tell of a rig.
 
-    ``sources`` are objects by the name of their file: a `Recording` of ``rig tune``, ``rig check`` or any multisine, a
-    `ModalAnalysis` or `LinearModes`, an `Exciter`, a `NonlinearMode`. Raises `ConfigurationError` for anything else, and if
-    nothing tells of exciter and structure.
+    ``sources`` are objects by the name of their file: a `Recording` of ``rig tune``, ``rig check`` or any multisine, or of a
+    backbone, a `ModalAnalysis` or `LinearModes`, an `Exciter`, a `NonlinearMode`. Raises `ConfigurationError` for anything
+    else, and if nothing tells of exciter and structure.
     """
     found = _Evidence()
     for name, source in sources.items():
         match source:
+            case Recording() if source.kind in kinds_that_yield(Backbone):
+                _mode(found, name, _mode_of(bench, name, source))
             case Recording():
-                _recording(found, bench, name, source)
+                _recording(found, bench, name, source, plan.known_plant)
             case ModalAnalysis():
                 _linear_modes(found, bench, name, source.modes)
             case LinearModes():
@@ -80,16 +99,13 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
             case Exciter():
                 _exciter(found, name, source)
             case NonlinearMode():
-                found.mode = source
-                found.sources.append(
-                    f"{name}: frequency and damping over the amplitude, {source.amplitude_m.size} levels"
-                )
+                _mode(found, name, source)
             case _:
                 raise ConfigurationError(
                     f"holds a {type(source).__name__}",
                     field="sources",
                     value=name,
-                    allowed="a recording of a multisine, linear modes, an exciter, a nonlinear mode",
+                    allowed="a recording of a multisine or a backbone, linear modes, an exciter, a nonlinear mode",
                 )
     plant = plan.known_plant
     if found.responses is None and plant is not None:
@@ -102,6 +118,7 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
             "virtual bench can be its own twin with `exact`",
             field="sources",
         )
+    known = found.responses
     channels = [channel.name for channel in bench.channels if channel.role == "response"]
     facts = bench.specimen
     start = {
@@ -109,8 +126,12 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
         "drive_shape": abs(facts.drive_mode_shape) if facts.drive_mode_shape is not None else 1.0,
         **found.start,
     }
+    linear = posterior(channels, start, found.priors, known)
+    if known is not None and linear.inflation > POOR_INFLATION:
+        narrow = posterior(channels, start, found.priors, _within(known, bench, NARROWER))
+        linear = min(linear, narrow, key=lambda fit: fit.inflation)
     return Knowledge(
-        linear=posterior(channels, start, found.priors, found.responses),
+        linear=linear,
         noise_rms=found.noise,
         loop_delay_samples=found.delay,
         shape_measured=found.shape,
@@ -119,10 +140,34 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
     )
 
 
-def _recording(found: _Evidence, bench: Bench, name: str, recording: Recording) -> None:
+def _mode_of(bench: Bench, name: str, recording: Recording) -> NonlinearMode:
+    """Return the mode of a recorded backbone; refuse one without accepted points, or of another mode."""
+    try:
+        mode = nonlinear_mode(backbone(recording))
+    except IdentificationError as error:
+        raise ConfigurationError(
+            f"{error}", field="sources", value=name, allowed="a backbone with accepted points"
+        ) from None
+    linear, lowest = bench.specimen.linear_frequency_hz, float(mode.modal_frequency_hz[0])
+    if abs(lowest / linear - 1.0) > OTHER_MODE:
+        raise ConfigurationError(
+            f"its lowest level vibrates at {lowest:.5g} Hz",
+            field="sources",
+            value=name,
+            allowed=f"a backbone near {linear:g} Hz",
+        )
+    return mode
+
+
+def _mode(found: _Evidence, name: str, mode: NonlinearMode) -> None:
+    found.mode = mode
+    found.sources.append(f"{name}: frequency and damping over the amplitude, {mode.amplitude_m.size} levels")
+
+
+def _recording(found: _Evidence, bench: Bench, name: str, recording: Recording, plant: PlantModel | None) -> None:
     if recording.kind != "multisine":
         raise ConfigurationError(
-            f"is a recording of kind {recording.kind}", field="sources", value=name, allowed="a multisine"
+            f"is a recording of kind {recording.kind}", field="sources", value=name, allowed="a multisine, a backbone"
         )
     level, measured = list(spectra(recording).items())[-1]
     names = _names(bench)
@@ -147,7 +192,12 @@ def _recording(found: _Evidence, bench: Bench, name: str, recording: Recording) 
     delay = about.get("lead_samples") if as_a_loop else None
     found.delay = None if delay is None else float(delay)
     found.shape = True
-    _start_from(found, bench, found.responses)
+    if plant is None:
+        _start_from(found, bench, found.responses)
+    else:
+        _plant_start(found, plant)
+        for key, log_std in KNOWN_LOG_STD.items():
+            found.priors.setdefault(key, Prior(found.start[key], log_std))
     found.sources.append(f"{name}: responses to a multisine of {level:.3g} V RMS, {int(inside.sum())} lines")
 
 
@@ -158,6 +208,18 @@ def _names(bench: Bench) -> list[str]:
 def _inside(bench: Bench, frequency_hz: Float) -> NDArray[np.bool_]:
     linear = bench.specimen.linear_frequency_hz
     return np.asarray((frequency_hz > BAND[0] * linear) & (frequency_hz < BAND[1] * linear))
+
+
+def _within(responses: Responses, bench: Bench, band: tuple[float, float]) -> Responses:
+    """Return the lines of a band, given as parts of the linear frequency."""
+    part = responses.frequency_hz / bench.specimen.linear_frequency_hz
+    kept = (part > band[0]) & (part < band[1])
+    return replace(
+        responses,
+        frequency_hz=responses.frequency_hz[kept],
+        value=responses.value[kept],
+        std=responses.std[kept],
+    )
 
 
 def _thinned(responses: Responses) -> Responses:

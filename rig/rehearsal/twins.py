@@ -116,14 +116,17 @@ class _Sample:
         points = ["drive", *self.linear.channels]
         self.at = points[int(place * len(points))]
         self.ratio = abs(1.0 if self.at == "drive" else self.linear.of(f"ratio {self.at}")) or 1.0
-        if self.knowledge.mode is None:
+        mode = self.knowledge.mode
+        if mode is None:
             if kind >= hypotheses.hardening + hypotheses.softening:
                 shift = 0.0
             self._spring(shift if kind < hypotheses.hardening else -shift, power)
             self._velocity_damping(growth)
             self._joint(joint_shift if joint else 0.0, slip)
         else:
-            self.elements.extend(elements_of(self.knowledge.mode, self.linear, self.generator))
+            self.elements.extend(elements_of(mode, self.linear, self.generator))
+            measured_m = float(mode.amplitude_m.max())  # up to which no stop was met, or the mode has it
+            stop = stop and gap * self.highest_m > measured_m
             self.unknowns |= {
                 "shift": 0.0,
                 "hardening_power": 0.0,

@@ -76,19 +76,20 @@ class Quantiles(Statistic):
 
 SIGNIFICANCE = 0.01  # probability, over all tests together, that an influence is found by chance; chosen
 MIN_DRAWS = 8  # least number of draws with a finite value for which an influence is tested; chosen
+BACKBONE = "a backbone up to 80 % of the highest level would settle it: run that, and give its recording with --from"
 ADVICE = {
     "frequency_hz": "measure the frequency again just before the test (`rig check`)",
     "damping_ratio": "measure the damping with finer lines (`rig tune`)",
     "drive_shape": "measure the mode shape at the drive point (`rig tune` or a modal test)",
     "moving_mass_kg": "identify the exciter over a wider band",
     "gain_factor": "check the amplifier's gain just before the test (`rig check`)",
-    "shift": "run the lowest levels first and look how far the frequency moves",
-    "hardening_power": "run all levels but the highest ones first, and look how fast the frequency moves",
-    "damping_growth": "run the lowest levels first and look how the damping grows",
-    "joint_shift": "run the lowest levels first: a joint that slips shows in the damping",
-    "joint_slip": "run the lowest levels first: a joint that slips shows in the damping",
-    "stop_gap": "look for stops and rattling parts within the motion that the plan asks for",
-    "stop_stiffness": "look for stops and rattling parts within the motion that the plan asks for",
+    "shift": BACKBONE,
+    "hardening_power": BACKBONE,
+    "damping_growth": BACKBONE,
+    "joint_shift": BACKBONE,
+    "joint_slip": BACKBONE,
+    "stop_gap": f"look for rattling parts; {BACKBONE}",
+    "stop_stiffness": f"look for rattling parts; {BACKBONE}",
     "second_mode": "measure the neighbourhood of the mode with a finer multisine",
 }
 """Measurement that narrows an unknown, by the unknown."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.drivers.virtual import VirtualDAQ
-from rig.rehearsal.forces import damping_for, describing_function, hardening_for, softening_for
+from rig.rehearsal.forces import damping_for, describing_function, hardening_for, softening_for, spring_through
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.twins import draw_twin
 from simulators.analysis import phase_resonance_backbone
@@ -32,9 +32,26 @@ def test_describing_functions_are_those_of_the_textbook():
 @pytest.mark.parametrize(("power", "place"), [(4, 1), (6, 2)])
 def test_steeper_springs_add_their_stiffness_at_their_amplitude(power, place):
     spring = hardening_for("drive", 500.0, 2e-3, power)
-    assert [k > 0.0 for k in spring["parameters"]] == [n == place for n in range(3)]
-    coefficient = spring["parameters"][place]
-    assert describing_function(lambda x: coefficient * x ** (power + 1), 2e-3) == pytest.approx(500.0)
+    *stiffnesses, scale = spring["parameters"]
+    assert [k > 0.0 for k in stiffnesses] == [n == place for n in range(3)]
+    found = describing_function(lambda x: stiffnesses[place] * (x / scale) ** power * x, 2e-3)
+    assert found == pytest.approx(500.0)
+
+
+def test_a_steep_spring_of_micrometres_is_one_that_a_rig_takes():
+    spring = hardening_for("drive", 1e6, 1e-6, 6)
+    assert max(map(abs, spring["parameters"])) < 1e30  # the largest number of a rig's file
+
+
+def test_a_spring_goes_through_any_stiffness_over_the_amplitude():
+    amplitudes = np.array([1.0, 1.4, 2.0, 2.8]) * 1e-4
+    asked = np.array([0.0, 0.0, 300.0, 250.0])  # flat, a stop, and softer again
+    spring = spring_through("drive", amplitudes, asked)
+    found = [
+        describing_function(lambda x: np.interp(x, spring["deflection_m"], spring["force_n"]), amplitude)
+        for amplitude in amplitudes
+    ]
+    assert found == pytest.approx(asked, abs=3.0)  # the gaps lie between nodes of the table
 
 
 def test_springs_add_their_stiffness_at_their_amplitude():

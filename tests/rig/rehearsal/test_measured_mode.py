@@ -1,5 +1,7 @@
 """A mode that was measured at low levels is the mode of the twins there, and a guess beyond."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,39 @@ def test_twins_have_the_measured_shift_and_damping(measured):
         asked = measured.modal_frequency_hz / 24.371 - 1.0
         assert np.max(np.abs(shift - asked)) < 5e-4, number
         assert np.max(np.abs(found.damping_ratio[1:] / measured.damping_ratio - 1.0)) < 0.1, number
+
+
+def test_twins_have_the_mode_of_a_stop_that_was_met(measured):
+    amplitude = np.geomspace(1e-4, 1e-3, 5)
+    gap = 0.45e-3
+    ratio = np.minimum(gap / amplitude, 1.0)
+    added = 0.2 * (
+        1.0 - 2.0 / np.pi * (np.arcsin(ratio) + ratio * np.sqrt(1.0 - ratio**2))
+    )  # Gelb and Vander Velde, 1968
+    frequency_hz = 24.37 * np.sqrt(1.0 + added)
+    assert frequency_hz[-1] > 1.03 * frequency_hz[0]
+    stopped = dataclasses.replace(
+        measured,
+        amplitude_m=amplitude,
+        modal_frequency_hz=frequency_hz,
+        modal_frequency_std_hz=np.full(5, 1e-4),
+        damping_ratio=np.full(5, 0.004),
+        damping_ratio_std=np.full(5, 1e-5),
+    )
+    found = backbone_of(stopped, 0, amplitude)
+    np.testing.assert_allclose(found.modal_frequency_hz, frequency_hz, rtol=2e-3)
+
+
+def test_a_stop_within_what_was_measured_is_no_longer_a_hypothesis(measured):
+    known = knowledge_of_the_magnet_beam(1e-6)
+    always = NOTHING.model_copy(update={"stop": 1.0, "stop_gap": (0.2, 1.0)})
+    highest = dataclasses.replace(
+        measured, amplitude_m=measured.amplitude_m * 10.0
+    )  # beyond all that the plan asks for
+    for mode, seen in ((None, True), (highest, False)):
+        told = dataclasses.replace(known, mode=mode)
+        gaps = [draw_twin(magnet_beam(), PLAN, told, always, 0, number).unknowns["stop_gap"] for number in range(4)]
+        assert [gap > 0.0 for gap in gaps] == [seen] * 4
 
 
 def test_twins_differ_beyond_what_was_measured_more_than_below(measured):

@@ -112,7 +112,7 @@ def test_what_matters_is_found_and_chance_is_not():
     assert found[0].unknown == "shift"
     assert {one.outcome for one in found} == {"ends well", "trip", "lost lock"}
     assert not any(one.unknown == "moving_mass_kg" for one in found)
-    assert "frequency moves" in found[0].advice
+    assert "backbone up to 80 %" in found[0].advice
 
 
 def test_reasons_are_equal_without_their_numbers():
