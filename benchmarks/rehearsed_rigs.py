@@ -1,10 +1,13 @@
-"""Is what a rehearsal foresees what happens? Random rigs by kind: tune, rehearsal, three runs with other noise.
+"""Is what a rehearsal foresees what happens? Random rigs by kind: tune, trial, rehearsal, three runs with other noise.
 
 - ``python -m benchmarks.rehearsed_rigs run FOLDER --seed 1 --each 8`` draws rigs (`benchmarks.random_rigs`) from a seed until
   there are so many of each kind, with stops, with joints and smooth ones (cubic springs, magnets), and tries those that have no
   result yet,
 - ``python -m benchmarks.rehearsed_rigs table FOLDER ...`` shows reliability and Brier score by kind, what was foreseen and what
   happened, and the largest phase error in ramps, with the feed-forward of the frequency and without it.
+
+- ``python -m benchmarks.rehearsed_rigs figure BENCH PLAN ramps.png`` draws level, frequency and phase error over one run,
+  with the feed-forward and without it.
 
 Several folders count as one batch.
 """
@@ -28,13 +31,14 @@ from benchmarks.random_rigs import compared, drawn, true_curve
 from rig.arming.run_options import RunOptions
 from rig.bench import load_bench
 from rig.campaigns.evaluation.recorded import points_of
+from rig.campaigns.plans import load_plan
 from rig.errors import RigError
 from rig.recording.reader import Recording
 from rig.rehearsal.knowledge import collect_knowledge
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.rehearsal.verdict import verdict_of
 from rig.tick.sequencer.layout import SegmentKind
-from rig.tuning import tune
+from rig.tuning import try_plan, tune
 
 KINDS = {"clearance": "stops", "jenkins": "joints", "iwan": "joints"}
 DRAWS, RUNS = 60, 3
@@ -50,12 +54,14 @@ def kind_of(bench: dict[str, Any]) -> str:
 
 
 def tried(path: Path) -> dict[str, Any]:
-    """Tune a bench, rehearse the plan and run it three times, and once without the feed-forward."""
+    """Tune a bench, try the plan, rehearse it and run it three times, and once without the feed-forward."""
     bench, seed = load_bench(path), int(path.stem.split("-")[-1])
     out: dict[str, Any] = {"rig": path.stem, "words": bench.description.removeprefix("drawn: ")}
     recording, began = path.with_name(f"{path.stem}-tune.h5"), time.perf_counter()
+    trial = path.with_name(f"{path.stem}-trial.h5")
     try:
-        tuned = tune(bench, recording, options=RunOptions(seed=seed, overwrite=True))
+        planned = tune(bench, recording, options=RunOptions(seed=seed, overwrite=True))
+        tuned = try_plan(planned, trial, RunOptions(seed=2 * 10**6 + seed, overwrite=True))
     except RigError as error:
         return out | {"refused": str(error)}
     plan = tuned.plan
@@ -65,12 +71,16 @@ def tried(path: Path) -> dict[str, Any]:
         "distortion": tuned.test.distortion,
         "tested_v": tuned.test.level_rms_v,
         "notes": list(tuned.notes),
+        "planned_m": planned.levels.levels_m,
+        "levels_m": tuned.levels.levels_m,
+        "trial_missing": tuned.trial.missing if tuned.trial else "",
+        "trial_tripped": tuned.trial is not None and tuned.trial.tripped,
         "plan": plan.model_dump(mode="json"),
         **true_curve(bench, tuned.levels.levels_m),
     }
     began = time.perf_counter()
-    with Recording(recording) as recorded:
-        known = collect_knowledge(bench, plan, {recording.name: recorded})
+    with Recording(recording) as recorded, Recording(trial) as tried_once:
+        known = collect_knowledge(bench, plan, {recording.name: recorded, trial.name: tried_once})
     request = RehearsalRequest(plan=plan, bench=bench, knowledge=known, draws=DRAWS, seed=seed, balanced=False)
     rehearsal = rehearse(request, until_certain=True, jobs=1)
     verdict = verdict_of(rehearsal)
@@ -188,6 +198,43 @@ def _reason(run: dict[str, Any]) -> str:
         return f"{run['end']}: {run['text'][:100]}"
     first = next((point for point in run["points"] if "amplitude_m" not in point), None)
     return "none" if first is None else f"{first['number'] + 1} {first['quality']}: {first['reason'][:100]}"
+
+
+@app.command()
+def figure(bench: Path, plan: Path, output: Path, seed: int = 1) -> None:
+    """Draw level, frequency and phase error over a run of a tuned plan, with the feed-forward and without it."""
+    from matplotlib.figure import Figure
+
+    rig_bench, tuned = load_bench(bench), load_plan(plan)
+    page = Figure(figsize=(11.0, 7.0), layout="constrained")
+    panels = page.subplots(3, 1, sharex=True)
+    for follows, color in ((False, "C1"), (True, "C0")):
+        controller = tuned.law.model_copy(update={"frequency_feed_forward": follows})
+        recording = output.with_suffix(".h5")
+        changed = tuned.model_copy(update={"controller": controller})
+        with rig.run(changed, bench=rig_bench, output=recording, seed=seed, overwrite=True) as run:
+            part = run.recording.parts[-1]
+            drive = part.rows("inputs")[:, rig_bench.index_of("drive")]
+            theta, hertz = part.rows("theta_rad"), part.rows("frequency_hz")
+            starts = np.flatnonzero(np.append(True, np.diff(theta) < -math.pi))
+            length = np.diff(np.append(starts, theta.size))
+
+            def mean(values: Any, starts: Any = starts, length: Any = length) -> Any:
+                return np.add.reduceat(np.nan_to_num(values), starts) / length
+
+            level = np.sqrt(2.0 * mean(drive**2)) / (2.0 * math.pi * mean(hertz)) ** 2
+            time_s = starts / rig_bench.sample_rate_hz
+            error = np.degrees(mean(part.rows("phase_error_rad")))
+        label = "frequency follows the points before" if follows else "without"
+        for axes, values in zip(panels, (1e3 * level, mean(hertz), error), strict=True):
+            axes.plot(time_s, values, color=color, lw=0.9, label=label)
+        recording.unlink()
+    for axes, text in zip(panels, ("drive point, mm", "frequency, Hz", "phase error, deg"), strict=True):
+        axes.set_ylabel(text)
+    panels[2].set_ylim(-60.0, 60.0)
+    panels[2].set_xlabel("time, s")
+    panels[0].legend()
+    page.savefig(output)
 
 
 @app.command()

@@ -1,6 +1,7 @@
 """``rig tune``: from a bench to a plan with designed gains."""
 
 import os
+import sys
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
@@ -39,6 +40,14 @@ def tune_(
         Path | None, typer.Option(help="Recording of the multisine; beside the plan if left out.")
     ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf, .svg or .html.")] = None,
+    trial: Annotated[
+        bool | None,
+        typer.Option(
+            "--trial/--no-trial",
+            help="Carry the plan out once, and keep the levels that are held; by default on virtual rigs only.",
+            show_default=False,
+        ),
+    ] = None,
     rehearse: Annotated[
         int,
         typer.Option(
@@ -51,21 +60,22 @@ def tune_(
     options: "RunOptions",
     json: Json = False,
 ) -> None:
-    """Measure a rig with a low-level multisine, design gains, write a plan that uses them, and rehearse it."""
+    """Measure a rig with a low-level multisine, design gains and levels, try them once, write the plan, and rehearse it."""
     from rig.bench import load_bench
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
-    from rig.errors import ConfigurationError
+    from rig.errors import ConfigurationError, RigError
     from rig.rehearsal.report import verdict_in_one_line
     from rig.show.waiting import Waiting
-    from rig.system.whole_file import whole_file
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure, draw_tuning
     from rig.tuning.linear_test import expected_duration
+    from rig.tuning.plant import TuningError
     from rig.tuning.report import lines, summary
     from rig.tuning.tuning import TuningRequest, tune
     from vibrolock.printable import printable
 
     loaded = load_bench(bench)
+    trial = loaded.driver.name == "virtual" if trial is None else trial
     request = TuningRequest(
         level_rms_v=level_rms_v, law=law, from_m=from_m, to_m=to_m, points=points, harmonics=harmonics
     )
@@ -75,21 +85,38 @@ def tune_(
     recorded = output.with_suffix(".h5") if recording is None else recording
     if recorded.suffix != ".h5":
         raise ConfigurationError(f"--recording {recorded}: recordings are written as .h5")
-    rehearsed = output.with_name(f"{output.stem}-rehearsal.h5")
-    if rehearse:
-        keep_existing([], rehearsed, options.overwrite)
+    tried, rehearsed = (output.with_name(f"{output.stem}-{what}.h5") for what in ("trial", "rehearsal"))
+    written = [tried] if trial else []
+    written += [rehearsed] if rehearse else []
+    for path in written:
+        if path.absolute() == recorded.absolute():
+            raise ConfigurationError(
+                f"--recording {recorded}: {path.name} is another result of this command, choose another name"
+            )
+        keep_existing([], path, options.overwrite)
     if figure is not None:
         check_figure(figure, options.overwrite)
-    what = f"tuning {loaded.name}: a low-level multisine, then the gains{', then a rehearsal' if rehearse else ''}"
-    usual = expected_duration(loaded, by_the_clock=by_the_clock(loaded, options))
-    with Waiting(what, usual, announced=True), shown(options, MULTISINE_COLUMNS) as watched:
+    then = f"{', then a trial of the plan' if trial else ''}{', then a rehearsal' if rehearse else ''}"
+    clock = by_the_clock(loaded, options)
+    usual = expected_duration(loaded, by_the_clock=clock)
+    with (
+        Waiting(f"tuning {loaded.name}: a low-level multisine, then the gains{then}", usual, announced=True),
+        shown(options, MULTISINE_COLUMNS) as watched,
+    ):
         found = tune(bench, recorded, request, watched, named=_as_seen_from(bench, output))
-    with whole_file(output) as part:
-        part.write_text(found.plan_toml, encoding="utf-8")
+    if trial:
+        try:
+            found = _tried(found, tried, options, clock)
+        except (RigError, OSError, KeyboardInterrupt, SystemExit) as error:
+            if type(error) is not TuningError:  # which says that the plan is none
+                _write(found, output)
+                print(f"the plan was written to {output}; its trial is not complete", file=sys.stderr)
+            raise
+    _write(found, output)
     if figure is not None:
         draw_tuning(found, figure)
     facts = {**summary(found), "plan": str(output), "figure": None if figure is None else str(figure)}
-    foreseen = _rehearsal(found, output, recorded, rehearsed, rehearse) if rehearse else None
+    foreseen = _rehearsal(found, output, rehearsed, rehearse) if rehearse else None
     facts["rehearsal"] = None if foreseen is None else foreseen.model_dump(by_alias=True)
     if json:
         print_json(facts)
@@ -98,17 +125,40 @@ def tune_(
         print(printable(line))
     if foreseen is not None:
         print(f"rehearsal      {verdict_in_one_line(foreseen)}; `rig show {rehearsed}` has the page")
-    print(f"plan written to {output}, multisine recorded in {recorded}" + (f", figure in {figure}" if figure else ""))
+    files = {"multisine recorded in": recorded, "trial in": tried if trial else None, "figure in": figure}
+    parts = [f"{what} {file}" for what, file in files.items() if file is not None]
+    print(f"plan written to {output}, {', '.join(parts)}")
 
 
-def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> "Summary":
+def _write(found: "Tuning", plan: Path, *head: str) -> None:
+    from rig.system.whole_file import whole_file
+
+    with whole_file(plan) as part:
+        part.write_text("\n".join([*head, found.plan_toml]), encoding="utf-8")
+
+
+def _tried(found: "Tuning", recording: Path, options: "RunOptions", by_the_clock: bool) -> "Tuning":
+    from rig.campaigns.backbone.points import BACKBONE_COLUMNS
+    from rig.campaigns.running.dry_run import expected_duration
+    from rig.show.waiting import Waiting
+    from rig.tuning.tuning import try_plan
+
+    usual = expected_duration(found.plan, found.bench, by_the_clock=by_the_clock)
+    with (
+        Waiting("a trial of the plan, up to its highest level", usual, announced=by_the_clock),
+        shown(options, BACKBONE_COLUMNS) as watched,
+    ):
+        return try_plan(found, recording, watched)
+
+
+def _rehearsal(found: "Tuning", plan: Path, rehearsed: Path, draws: int) -> "Summary":
     from rig.cli.rehearse import Rehearsing
     from rig.rehearsal.report import summary, verdict_in_one_line
     from rig.results.rehearsal.rehearse import Subject, expected_duration, rehearse_into, request_for
     from rig.show.waiting import Waiting
-    from rig.system.whole_file import whole_file
 
-    subject = Subject(plan=found.plan, bench=found.bench, sources=[recording], draws=draws)
+    sources = [found.recording, *([] if found.trial is None else [found.trial.recording])]
+    subject = Subject(plan=found.plan, bench=found.bench, sources=sources, draws=draws)
     with Waiting("learning what is known of the rig"):
         request = request_for(subject)
     with Rehearsing(draws, expected_duration(request, jobs=-1)) as listener:
@@ -116,8 +166,7 @@ def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, dr
             rehearse_into(request, rehearsed, overwrite=True, until_certain=True, listener=listener, jobs=-1)
         )
     head = wrap(f"Rehearsal: {verdict_in_one_line(facts)}.", 118, initial_indent="# ", subsequent_indent="# ")
-    with whole_file(plan) as part:
-        part.write_text("\n".join([*head, found.plan_toml]), encoding="utf-8")
+    _write(found, plan, *head)
     return facts
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,12 +50,14 @@ def low_pass(
 
 
 LIMIT_FRACTION = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
+LARGER_FRACTION = 2.0 / 3.0  # the same where levels span less than `NARROWEST_SPAN` and rounding disturbs some; chosen
 SPAN = 30.0  # highest level over lowest, where noise allows
 MIN_SPAN = 1.5  # highest level over lowest that rounding may reduce it to; the lowest points may then be refused
 MIN_FORCE_BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
 MAX_NONHARMONIC = 0.05
 """Of the force's RMS: what rounding may add at the lowest level. Plans accept 0.1 by default: lines of a rounded sine may lie
 where the force per volt is large, and add twice as much as if they were spread evenly."""
+NARROWEST_SPAN = 2.0  # span below which larger levels are tried where rounding disturbs; chosen
 NARROW_SPAN = 10.0  # span below which rounding may add more, and the plan accepts more
 ACCEPTED_QUIET = 0.15  # of the force's RMS: what a plan accepts where `MAX_NONHARMONIC` bounds its lowest level; chosen
 SHORT_SPAN = 4.0  # span below which the lowest level is no longer raised for a lower rounding; chosen
@@ -78,6 +80,29 @@ class LevelChoice:
     """What bounds the levels."""
     accepted_nonharmonic: float | None = None
     """Part of the force away from its harmonics that the plan must accept, because rounding causes it; None: the usual one."""
+
+    @property
+    def span(self) -> float:
+        """Highest level over lowest."""
+        return self.levels_m[-1] / self.levels_m[0]
+
+    def within(self, lowest_m: float, highest_m: float, why: str) -> "LevelChoice":
+        """Return as many levels in equal ratios between two displacements (m peak)."""
+        levels = _spread(lowest_m, highest_m, len(self.levels_m))
+        volts, newtons = self.needed_v[-1] / self.levels_m[-1], self.forces_n[-1] / self.levels_m[-1]
+        return replace(
+            self,
+            levels_m=levels,
+            needed_v=tuple(volts * level for level in levels),
+            forces_n=tuple(newtons * level for level in levels),
+            why=why,
+        )
+
+
+def _spread(lowest_m: float, highest_m: float, points: int) -> tuple[float, ...]:
+    if points == 1:
+        return (highest_m,)
+    return tuple(float(f"{level:.4g}") for level in np.geomspace(lowest_m, highest_m, points))
 
 
 def needed_v(plant: PlantModel, level_m: float) -> float:
@@ -152,18 +177,17 @@ def choose_levels(
     ratios: Mapping[str, float],
     *,
     lowest: LowestForce,
+    highest_m: float,
     from_m: float | None = None,
-    to_m: float | None = None,
     points: int = 8,
 ) -> LevelChoice:
-    """Choose levels in equal ratios, from the lowest force above noise to a third of what the limits allow.
+    """Choose levels in equal ratios, from the lowest force above noise, or ``from_m``, to the highest level.
 
     ``ratios`` are as for `reach_m`. Raises `ConfigurationError` for a level that the bench cannot reach.
     """
     reach, limit = reach_m(bench, plant, ratios)
     told = lowest.force_n / needed_n(plant, 1.0)
-    first = told if from_m is None else from_m
-    highest = LIMIT_FRACTION * reach if to_m is None else to_m
+    first, highest = told if from_m is None else from_m, highest_m
     if highest > reach:
         raise ConfigurationError(
             field="to_m",
@@ -176,9 +200,7 @@ def choose_levels(
             f"levels from {first:.3g} m to {highest:.3g} m: allowed is a lowest level above 0 and below the highest; the "
             f"force is above the noise from {told:.3g} m on"
         )
-    levels = (
-        tuple(float(f"{level:.4g}") for level in np.geomspace(first, highest, points)) if points > 1 else (highest,)
-    )
+    levels = _spread(first, highest, points)
     why = f"the highest is {highest / reach:.2f} of what {limit} allows on the linear plant"
     why += f", the lowest has {needed_n(plant, levels[0]):.3g} N of force"
     return LevelChoice(

@@ -98,7 +98,7 @@ def measure(
     """
     bench, runs = series.bench, _Runs(series, bench_name, highest_hz)
     if level_rms_v is None:
-        tried, enough = SEARCH.search(bench, runs.listen)
+        tried, enough = SEARCH.search(bench, runs.search_at)
         if not enough:
             _audible(bench, tried[-1], runs.coherence, "at half of the bench's limits")
     else:
@@ -207,18 +207,19 @@ class _Runs:
             )
         return self.measured
 
-    def listen(self, level_rms_v: float) -> Seen:
-        """Play a level with coarse lines, and evaluate how its responses stand out of the noise.
-
-        A level that trips at a limit of force or motion is lowered once, to a quarter.
-        """
+    def search_at(self, level_rms_v: float) -> Seen:
+        """Play a level of the search; one that trips at a limit of force or motion is lowered once, to a quarter."""
         try:
-            self.at(level_rms_v, _coarse(self.bench), 1)
+            return self.listen(level_rms_v)
         except _LimitError as error:
             if self.tripped:
                 raise
             self.tripped = str(error)
             return Seen(False, SEARCH.safe_share / AFTER_TRIP)
+
+    def listen(self, level_rms_v: float) -> Seen:
+        """Play a level with coarse lines, and evaluate how its responses stand out of the noise."""
+        self.at(level_rms_v, _coarse(self.bench), 1)
         self.coherence = coherence_of(self.bench, self.measured)
         least = min(self.coherence)
         noise = math.sqrt(max(1.0 / max(least, 1e-9) - 1.0, 0.0) / (1.0 / GOOD_COHERENCE - 1.0))

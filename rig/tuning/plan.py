@@ -12,12 +12,13 @@ from rig.tuning.design import Chosen, gains_of, steepest_hardening
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
 from rig.tuning.plant import ChannelRatios
-from rig.tuning.shifts import Window, ramp_periods, readable_start_ramp, start_periods, start_voltage
+from rig.tuning.shifts import Start, Window, ramp_periods, start_periods
 
 HARMONICS = 5  # harmonics that are evaluated; chosen
 AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
 MIN_TIMEOUT_PERIODS = 1000  # shortest time in which a point must settle, periods; chosen
 LOST_PERIODS = 20  # at least
+NEAR_LIMITS = 0.9  # of the limits: levels are given up there; chosen
 GENTLE = 1.0  # largest slope that is written: only a vibration that runs away is beyond it
 WAITING_DEG = 15.0  # error above which a ramp waits: the loops are quick
 
@@ -29,6 +30,7 @@ def plan_text(
     measured: ChannelRatios,
     chosen: Chosen,
     levels: LevelChoice,
+    start: Start,
     window: Window,
     harmonics: HarmonicsChoice | None,
     recording: Path,
@@ -53,18 +55,19 @@ def plan_text(
     lost_periods = max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))
     ramp = ramp_periods(plant, chosen.tracking_periods)
     if not volts:
-        ramp = max(ramp, 5.0 * math.ceil(readable_start_ramp(bench, plant, levels.needed_v[0]) / 5.0))
         head += [
-            "# Voltage of the lowest level on the linear plant, or less: on the way there a structure takes more force.",
-            _line("start_v", significant(start_voltage(bench, plant, levels.needed_v[0], ramp), 4)),
+            "# Voltage of the lowest level on the linear plant (before a trial), or less: the way there takes more force.",
+            _line("start_v", significant(start.voltage_v, 4)),
+            _line("start_ramp_periods", start.ramp_periods),
             "# Until vibration and frequency have come to rest there.",
             _line("start_periods", start_periods(plant, chosen.tracking_periods)),
         ]
     head += [
         "# Slow enough that force and frequency follow with the damping as measured.",
         _line("ramp_periods", ramp),
-        "# A level that loses the lock is left out, and those above it.",
+        "# A level that loses the lock, or comes near a limit, is left out, and those above it.",
         _line("on_lost_lock", "skip"),
+        _line("near_limits", NEAR_LIMITS),
     ]
     if levels.accepted_nonharmonic is not None:
         head += [

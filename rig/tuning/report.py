@@ -67,7 +67,22 @@ def summary(tuning: Tuning) -> dict[str, JsonValue]:
         "needed_v": list(tuning.levels.needed_v),
         "levels_why": tuning.levels.why,
         "harmonics": _harmonics(tuning.harmonics),
+        "trial": _trial(tuning),
         "notes": list(tuning.notes),
+    }
+
+
+def _trial(tuning: Tuning) -> dict[str, JsonValue] | None:
+    if (trial := tuning.trial) is None:
+        return None
+    return {
+        "recording": str(trial.recording),
+        "accepted": trial.accepted,
+        "points": len(trial.points),
+        "held": list(trial.held),
+        "missing": trial.missing,
+        "end": trial.end,
+        "tripped": trial.tripped,
     }
 
 
@@ -134,6 +149,12 @@ def lines(tuning: Tuning) -> list[str]:
         f"levels         {1e3 * levels_m[0]:.3g} to {1e3 * levels_m[-1]:.3g} mm in {len(levels_m)} steps, {needed_v[0]:.3g} to "
         f"{needed_v[-1]:.3g} V on the linear plant; {tuning.levels.why}"
     )
+    if tuning.trial is not None:
+        held, missing = tuning.trial.held, tuning.trial.missing
+        kept = "all levels were held" if not missing else f"levels {held[0] + 1} to {held[-1] + 1} were held; {missing}"
+        if not missing and tuning.trial.recording.name in tuning.levels.why:
+            kept += ", the lowest is raised for rounding"
+        out.append(f"trial          {kept}{'; it tripped' if tuning.trial.tripped else ''}")
     if tuning.harmonics is not None:
         settings, found = tuning.harmonics.settings, tuning.harmonics.sensitivity_peaks
         peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in found.items()) or "unknown"

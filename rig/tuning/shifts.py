@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,12 @@ SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a 
 MIN_PROMINENCE = 3.0  # of a mode's peak over the lowest response between it and the tested mode
 RAMP_TIME_CONSTANTS = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
 MIN_RAMP, MAX_RAMP = 20.0, 300.0  # ramps, periods
-START_SHARE = 0.5  # of the force limit, on the way to the start voltage
+START_SHARE = 0.25  # of the force limit, on the way to the start voltage; chosen: stiff springs double the linear force
 START_REACH = 0.03  # distance from resonance at which a run may begin, relative: tunings were off by up to 1 %
 READABLE = 5.0  # force at the start over the least whose phase is read (0.4 bits): rounding disturbs fewer bits; chosen
 MIN_START, MAX_START = 40.0, 600.0  # periods
+START_RAMPS = (10.0, 20.0, 40.0, 80.0, 160.0, 300.0)  # lengths of the ramp to the start voltage, periods
+HELD_DECAYS = 4.0  # of the coupled pole, for which the start is computed
 PLAUSIBLE_SHIFT = 0.005  # change of the frequency from level to level
 
 
@@ -95,36 +98,45 @@ def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
     return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), MIN_RAMP), MAX_RAMP))
 
 
-def start_voltage(bench: Bench, plant: PlantModel, needed_v: float, ramp_periods: float) -> float:
-    """Return the voltage (V peak) that sets the rig in motion: ``needed_v``, that of the lowest level, or less.
+class Start(NamedTuple):
+    """How a run sets the rig in motion."""
 
-    The force on the way there may reach half of the bench's limit. At resonance a lightly damped structure takes a small part
-    of the force that the same voltage gives while it is at rest, u / alpha: a hundredth, which a sensor may not read. A ramp of
-    T lets it move along. Then the force is that of the steady vibration, near resonance, and ``tau / T`` of that at rest, with
-    the time constant tau of the coupled pole.
+    voltage_v: float
+    """Voltage at which the lock is sought, V peak."""
+    ramp_periods: float
+    """Length of the ramp to it, periods."""
+
+
+def start_of(bench: Bench, plant: PlantModel, needed_v: float) -> Start:
+    """Return the voltage that sets the rig in motion, ``needed_v`` (V peak) of the lowest level or less, and the ramp to it.
+
+    The force on the way there may reach a quarter of the bench's limit (`largest_start_force`). The ramp is the shortest of
+    some whose voltage then gives a force at resonance that can be read, or that of the lowest level.
     """
-    at_rest, near, behind = _starting_forces(plant)
-    return min(needed_v, START_SHARE * bench.limits.force_n / min(at_rest, near + behind / ramp_periods))
-
-
-def readable_start_ramp(bench: Bench, plant: PlantModel, needed_v: float) -> float:
-    """Return the least length of a ramp, periods, with which `start_voltage` gives a force that can be read; at most 300."""
     force = bench.channels[bench.index_of("force")]
     readable_v = min(needed_v, READABLE * SMALLEST_BITS * force.resolution_in_unit * plant.volts_per_newton())
-    at_rest, near, behind = _starting_forces(plant)
-    allowed = START_SHARE * bench.limits.force_n / readable_v
-    if at_rest <= allowed:
-        return 0.0
-    return MAX_RAMP if allowed <= near else min(behind / (allowed - near), MAX_RAMP)
+    allowed_n = START_SHARE * bench.limits.force_n
+    starts = (Start(min(needed_v, allowed_n / largest_start_force(plant, ramp)), ramp) for ramp in START_RAMPS)
+    return next(start for start in starts if start.voltage_v >= readable_v or start.ramp_periods == START_RAMPS[-1])
 
 
-def _starting_forces(plant: PlantModel) -> tuple[float, float, float]:
-    """Force per volt (N/V) at rest, largest near resonance, and in a ramp of one period."""
+def largest_start_force(plant: PlantModel, ramp_periods: float) -> float:
+    """Return the largest force per volt (N/V) in a ramp of the voltage to 1 V, and while it is held, near resonance.
+
+    At resonance a lightly damped structure takes a small part of the force that the same voltage gives while it is at rest, or
+    a few per cent beside it. The envelope of the force is the inverse Fourier transform of that of the voltage, a raised
+    cosine, times the response around the output's frequency, which is within `START_REACH` of the resonance.
+    """
     resonance = plant.lock_frequency_rad_s()
-    at_rest = 1.0 / abs(complex(plant.exciter(1j * resonance)[0]))
-    near = resonance * np.linspace(1.0 - START_REACH, 1.0 + START_REACH, 61)
-    time_constant = resonance / (-2.0 * math.pi * plant.coupled_pole_rad_s.real)
-    return at_rest, float(np.max(np.abs(plant.force_per_v(1j * near)))), time_constant * at_rest
+    decay = resonance / (-2.0 * math.pi * plant.coupled_pole_rad_s.real)
+    rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(ramp_periods) / ramp_periods))
+    held = np.ones(math.ceil(min(HELD_DECAYS * decay, MAX_START)))
+    envelope = np.concatenate([rise, held, rise[::-1]])  # one entry a period
+    size = 2 ** math.ceil(math.log2(2 * envelope.size))
+    sent = np.fft.fft(envelope, size)
+    frequency = resonance * np.linspace(1.0 - START_REACH, 1.0 + START_REACH, 13)[:, None]
+    around = frequency * (1.0 + np.fft.fftfreq(size))
+    return float(np.max(np.abs(np.fft.ifft(sent * plant.force_per_v(1j * around)))))
 
 
 def start_periods(plant: PlantModel, tracking_periods: float) -> float:

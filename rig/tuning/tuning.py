@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -16,8 +17,10 @@ from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
 from rig.tuning.harmonics import HarmonicsChoice, band_for, check_highest, choose_harmonics
 from rig.tuning.levels import (
+    LARGER_FRACTION,
     LIMIT_FRACTION,
     NARROW_SPAN,
+    NARROWEST_SPAN,
     SPAN,
     LevelChoice,
     LowestForce,
@@ -30,7 +33,8 @@ from rig.tuning.levels import (
 from rig.tuning.linear_test import MAX_DISTORTION, LinearTest, measure
 from rig.tuning.plan import plan_text
 from rig.tuning.plant import ChannelRatios, UnsuitedError, channel_ratios, compared_with_bench, plant_of
-from rig.tuning.shifts import frequency_window
+from rig.tuning.shifts import Start, Window, frequency_window, start_of
+from rig.tuning.trial import PlanTrial, carried_out
 from vibrolock.results import Result
 
 PURPOSE = "tuning"  # purpose of the recording of a tuning, in the facts of its parts
@@ -108,8 +112,34 @@ class Tuning(Result):
     """The harmonics loop, if it was asked for."""
     notes: tuple[str, ...]
     """Notes for the user, one line each."""
-    plan_toml: str
-    """The plan as TOML."""
+    level_notes: tuple[str, ...]
+    """Those of the notes that are on the levels; they go where a trial changes these."""
+    larger: LevelChoice | None
+    """Levels up to two thirds of what the limits allow, where rounding bounds the lowest level and none was asked for."""
+    start: Start
+    """How a run of the plan sets the rig in motion; levels that a trial changes begin as the trial did."""
+    window: Window
+    """Frequencies that the loop of the plan may take."""
+    bench_name: str
+    """Name of the bench in the plan."""
+    trial: PlanTrial | None = None
+    """Trial of the plan, if it was carried out (`try_plan`)."""
+
+    @property
+    def plan_toml(self) -> str:
+        """The plan as TOML."""
+        return plan_text(
+            self.bench_name,
+            self.bench,
+            self.plant,
+            ChannelRatios(self.response_ratios, self.response_ratio_stds, self.response_turns_deg),
+            self.chosen,
+            self.levels,
+            self.start,
+            self.window,
+            self.harmonics,
+            self.recording,
+        )
 
     @property
     def plan(self) -> BackbonePlan:
@@ -144,17 +174,8 @@ def tune(
     series = MultisineSeries(bench, Path(recording), options or RunOptions(), PURPOSE)
     found = _designed(bench, request, name, series)
     test, plant, measured, chosen = found.test, found.plant, found.measured, found.chosen
-    notes = list(found.notes)
-    levels = choose_levels(
-        bench,
-        plant,
-        bench.response_ratios | measured.ratios,
-        lowest=found.lowest,
-        from_m=request.from_m,
-        to_m=request.to_m,
-        points=request.points,
-    )
-    notes += _cautions(bench, test, levels)
+    levels, larger = _levels(found, bench, request)
+    level_notes = _reach(bench, levels)
     harmonics = None
     if request.harmonics is not None:
         lock_hz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
@@ -162,22 +183,53 @@ def tune(
             test.responses, test.lead_samples, bench.sample_rate_hz, lock_hz, request.harmonics
         )
     if request.from_m is None:
-        notes += _narrow(bench, levels, found.lowest)
-    window, path = frequency_window(bench, test.responses, plant), Path(recording)
+        level_notes += _narrow(bench, levels, found.lowest)
     return Tuning(
         bench=bench,
         test=test,
-        recording=path,
+        recording=Path(recording),
         plant=plant,
         response_ratios=measured.ratios,
         response_ratio_stds=measured.stds,
         response_turns_deg=measured.turns_deg,
         chosen=chosen,
         levels=levels,
+        larger=larger,
         harmonics=harmonics,
-        notes=tuple(notes),
-        plan_toml=plan_text(named or name, bench, plant, measured, chosen, levels, window, harmonics, path),
+        notes=(*found.notes, *_cautions(test), *level_notes),
+        level_notes=tuple(level_notes),
+        start=start_of(bench, plant, levels.needed_v[0]),
+        window=frequency_window(bench, test.responses, plant),
+        bench_name=named or name,
     )
+
+
+def try_plan(tuning: Tuning, recording: str | Path, options: RunOptions | None = None) -> Tuning:
+    """Carry out the plan of a tuning once, recorded in ``recording``, and return the tuning with the levels that were held.
+
+    The plan keeps the longest row of levels that were accepted with something to spare (`PlanTrial.held`), in as many steps. Of
+    what lies above them, as a backbone that becomes too steep, or below, as rounding, a linear test tells little. Where levels
+    span little and rounding disturbs some of them, larger ones are tried once.
+
+    Raises `rig.tuning.plant.TuningError` if no range of levels was held, `rig.tuning.trial.TrialEndedError` if the run ended
+    for another reason, and the errors of `rig.run`.
+    """
+    options, path = options or RunOptions(), Path(recording)
+    found = carried_out(tuning.plan, tuning.bench, path, options)
+    if tuning.larger is not None and found.is_disturbed and tuning.levels.span < NARROWEST_SPAN:
+        note = f"up to a third of the limits rounding disturbs the levels ({found.missing}); these are larger"
+        larger = replace(tuning, levels=tuning.larger, larger=None, notes=(*tuning.notes, note))
+        beside = path.with_name(f"{path.stem}-larger{path.suffix}")
+        again = carried_out(larger.plan, tuning.bench, beside, options)
+        if again.held_span(larger.levels) > found.held_span(tuning.levels):
+            tuning, found = larger, replace(again, recording=beside.replace(path))
+        else:
+            beside.unlink()
+    levels = found.levels(tuning.levels)
+    if levels is tuning.levels:
+        return replace(tuning, trial=found)
+    notes = tuple(note for note in tuning.notes if note not in tuning.level_notes)
+    return replace(tuning, levels=levels, notes=notes, trial=found)
 
 
 class _Designed(NamedTuple):
@@ -186,6 +238,7 @@ class _Designed(NamedTuple):
     test: LinearTest
     plant: PlantModel
     measured: ChannelRatios
+    highest_m: float
     lowest: LowestForce
     chosen: Chosen
     notes: tuple[str, ...]
@@ -239,7 +292,23 @@ def _gains(bench: Bench, request: TuningRequest, test: LinearTest) -> _Designed:
     densities = (test.force_density, test.acceleration_density)
     largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n, needed_n(plant, highest_m))
     chosen = choose(plant, test.responses, request.law, largest, noise)
-    return _Designed(test, plant, measured, replace(lowest, force_n=lowest_n), chosen, notes)
+    return _Designed(test, plant, measured, highest_m, replace(lowest, force_n=lowest_n), chosen, notes)
+
+
+def _levels(found: _Designed, bench: Bench, request: TuningRequest) -> tuple[LevelChoice, LevelChoice | None]:
+    """Return levels, and larger ones, up to two thirds of what the limits allow, where rounding bounds the lowest.
+
+    There are no larger ones where levels were asked for.
+    """
+    plant, ratios = found.plant, bench.response_ratios | found.measured.ratios
+    choice = partial(choose_levels, bench, plant, ratios, points=request.points)
+    wanted = choice(lowest=found.lowest, highest_m=found.highest_m, from_m=request.from_m)
+    if request.from_m is not None or request.to_m is not None or not found.lowest.bound:
+        return wanted, None
+    highest_m = LARGER_FRACTION * reach_m(bench, plant, ratios)[0]
+    bounded = lowest_force(bench, plant, highest_m, found.test.bits_force_n)
+    lowest = replace(bounded, force_n=max(bounded.force_n, found.lowest.force_n))
+    return wanted, choice(lowest=lowest, highest_m=highest_m)
 
 
 def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> list[str]:
@@ -262,17 +331,22 @@ def _turned(turns_deg: Mapping[str, float]) -> list[str]:
     ]
 
 
-def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> list[str]:
+def _cautions(test: LinearTest) -> list[str]:
     out = [f"{test.tripped}; the search went on with a quarter of that level"] if test.tripped else []
     if test.distortion > MAX_DISTORTION:
         out.append(
             f"the multisine at {test.level_rms_v:.3g} V RMS shows {100.0 * test.distortion:.2g} % of nonlinear distortion: "
             "frequency and damping are those of that level; tune at a lower one for those of the linear plant"
         )
-    limit, highest = bench.limits.voltage_v, levels.needed_v[-1]
-    if highest > LIMIT_FRACTION * limit * 1.001:
-        out.append(
-            f"the highest level needs {highest:.3g} of {limit:g} V on the linear plant: it is out of reach if the damping "
-            f"rises beyond {limit / highest:.2g} times that of the multisine"
-        )
     return out
+
+
+def _reach(bench: Bench, levels: LevelChoice) -> list[str]:
+    """Return a note on a highest level that leaves little room for more damping."""
+    limit, highest = bench.limits.voltage_v, levels.needed_v[-1]
+    if highest <= LIMIT_FRACTION * limit * 1.001:
+        return []
+    return [
+        f"the highest level needs {highest:.3g} of {limit:g} V on the linear plant: it is out of reach if the damping "
+        f"rises beyond {limit / highest:.2g} times that of the multisine"
+    ]

@@ -15,9 +15,6 @@ from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
 from vibrolock.errors import InputError
 
-START_RAMP_PERIODS = 10.0
-"""Slow enough that an exciter of another gain than the known plant's is noticed at a small force."""
-
 LEVELS = {
     "levels_v": (AmplitudeLaw.VOLTAGE, "V"),
     "levels_n": (AmplitudeLaw.FORCE, "N"),
@@ -53,6 +50,9 @@ class Levels(Configured):
     """Levels as amplitude of the drive point's fundamental displacement, m peak, up to the bench's ``displacement_m``."""
     start_v: float | None = Field(None, gt=0)
     """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""
+    start_ramp_periods: float = Field(10.0, ge=1, le=1e5)
+    """Length of the ramp to ``start_v``, periods: slow enough that an exciter of another gain than the known plant's is noticed
+    at a small force."""
     start_periods: float = Field(40.0, ge=1, le=1e5)
     """Time at ``start_v`` in which the lock is gained, periods. It is extended a little while it is uncertain whether there is
     a lock. If there is none at the end (the frequency stays at an end of its window for 20 periods, or the phase is far off for
@@ -113,7 +113,7 @@ class Levels(Configured):
             SegmentKind.RAMP,
             -1,
             self.start_v,
-            START_RAMP_PERIODS,
+            self.start_ramp_periods,
             excitation=excitation,
             amplitude_law=AmplitudeLaw.VOLTAGE,
             lag_deg=lag_deg,

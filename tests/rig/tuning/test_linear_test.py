@@ -60,10 +60,10 @@ def test_a_level_that_trips_at_a_limit_is_lowered_once(monkeypatch):
         _ended_well(_ended("force_limit"), level_rms_v)
 
     monkeypatch.setattr(runs, "at", at)
-    assert SEARCH.next_level(0.01, runs.listen(0.01)) == pytest.approx(AFTER_TRIP * 0.01)
+    assert SEARCH.next_level(0.01, runs.search_at(0.01)) == pytest.approx(AFTER_TRIP * 0.01)
     assert "0.01 V RMS: it tripped" in runs.tripped
     with pytest.raises(TuningError, match=r"0\.0025 V RMS: it tripped"):
-        runs.listen(0.0025)
+        runs.search_at(0.0025)
     assert played == [0.01, 0.0025]
 
 
@@ -72,4 +72,4 @@ def test_what_else_ends_a_multisine_ends_the_tuning(monkeypatch, reason):
     runs = _Runs(SimpleNamespace(bench=bench_with()), "magnet-beam", None)
     monkeypatch.setattr(runs, "at", lambda level_rms_v, *_: _ended_well(_ended(reason), level_rms_v))
     with pytest.raises(TuningError, match="it tripped"):
-        runs.listen(0.01)
+        runs.search_at(0.01)

@@ -281,7 +281,8 @@ def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(com
     told = json.loads(command(f"{line} --json").succeeded().out)
     assert told["plan"] == "tuned.toml"
     assert told["plant"]["drive_mode_shape"] == pytest.approx(0.908466, rel=2e-3)
-    assert {path.name for path in tmp_path.iterdir()} == {"tuned.toml", "tuned.h5", "tuned.png", "tuned-rehearsal.h5"}
+    names = {"tuned.toml", "tuned.h5", "tuned.png", "tuned-trial.h5", "tuned-rehearsal.h5"}
+    assert {path.name for path in tmp_path.iterdir()} == names
     assert told["rehearsal"]["draws"] == 2
     assert (tmp_path / "tuned.png").read_bytes()[:4] == b"\x89PNG"
     written = (tmp_path / "tuned.toml").read_text()

@@ -1,0 +1,214 @@
+"""A trial of a tuned plan: which levels count as held, and what the plan makes of them."""
+
+import dataclasses
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from rig.arming.run_options import RunOptions
+from rig.campaigns.evaluation.point import Point, Purity, Quality, Spectrum, Vibration
+from rig.campaigns.plans import load_plan
+from rig.recording.reader import Recording
+from rig.tuning import TuningError, TuningRequest, try_plan, tune
+from rig.tuning.levels import LevelChoice
+from rig.tuning.trial import PlanTrial, TrialEndedError
+from tests.refused import refused
+from tests.rig.tuning.tuned import tuned_once
+
+PLANNED = LevelChoice(
+    levels_m=(1e-4, 2e-4, 4e-4, 8e-4), needed_v=(0.1, 0.2, 0.4, 0.8), forces_n=(0.01, 0.02, 0.04, 0.08), why="chosen"
+)
+
+
+def point(number, quality=Quality.GOOD, *, settled_after=80.0, nonharmonic=0.01, reason=""):
+    return Point(
+        number=number,
+        level=PLANNED.levels_m[number],
+        level_unit="m",
+        direction="up",
+        repeat=1,
+        settled=quality.accepted,
+        reason=reason,
+        quality=quality,
+        settle_periods=settled_after,
+        nonharmonic_force=nonharmonic,
+    )
+
+
+def trial(tmp_path, *points, tripped=False):
+    return PlanTrial(
+        recording=tmp_path / "tuned-trial.h5",
+        points=points,
+        end="force above its limit" if tripped else "the plan was carried out",
+        tripped=tripped,
+        judged_channels=(0, 1),
+        accepted_drift=0.05,
+        longest_settling=1000.0,
+        accepted_nonharmonic=0.1,
+    )
+
+
+def test_a_plan_whose_levels_were_all_held_stays_as_it_is(tmp_path):
+    found = trial(tmp_path, *map(point, range(4)))
+    assert (list(found.held), found.missing) == ([0, 1, 2, 3], "")
+    assert found.levels(PLANNED) is PLANNED
+
+
+@pytest.mark.parametrize("quality", [Quality.TOO_STEEP, Quality.NEAR_LIMIT, Quality.LOST_LOCK, Quality.REJECTED])
+def test_levels_lie_within_the_longest_row_that_was_held(tmp_path, quality):
+    found = trial(tmp_path, point(0, Quality.REJECTED), point(1), point(2), point(3, quality, reason="because"))
+    assert found.missing == "level 1: rejected"
+    levels = found.levels(PLANNED)
+    assert levels.levels_m == pytest.approx(np.geomspace(2e-4, 4e-4, 4), rel=1e-3)
+    assert levels.needed_v == pytest.approx(np.geomspace(0.2, 0.4, 4), rel=1e-3)
+    assert levels.forces_n == pytest.approx(np.geomspace(0.02, 0.04, 4), rel=1e-3)
+    assert "tuned-trial.h5" in levels.why
+
+
+def test_a_level_that_settled_late_is_not_held(tmp_path):
+    found = trial(tmp_path, point(0), point(1), point(2), point(3, settled_after=700.0))
+    assert list(found.held) == [0, 1, 2]
+    assert found.missing == "level 4: took 700 periods to settle"
+    assert found.is_disturbed
+
+
+@pytest.mark.parametrize(
+    ("force", "drive", "response", "held"), [(0.04, 0, 0, 3), (0.02, 0.035, 0, 3), (0, 0, 0.04, 4)]
+)
+def test_a_level_whose_force_or_drive_drifted_is_not_held(tmp_path, force, drive, response, held):
+    drift = np.array([force, drive, response], complex)
+    nothing = np.zeros((3, 2), complex)
+    spectrum = Spectrum(harmonics=nothing, harmonics_std=None, residual_rms=np.zeros(3), drift=drift)
+    purity = Purity(force_purity=1.0, response_purity=1.0, power_indicator=1.0, harmonic_power=0.0)
+    vibration = Vibration(
+        frequency_hz=24.0, force_n=0.1, amplitude_m=8e-4, voltage_v=0.8, purity=purity, periods=50, spectrum=spectrum
+    )
+    last = dataclasses.replace(point(3), vibration=vibration)
+    found = trial(tmp_path, *map(point, range(3)), last)
+    assert len(found.held) == held
+    assert bool(found.missing) == (held < 4)
+
+
+def test_the_lowest_level_is_raised_where_rounding_nearly_spoils_it(tmp_path):
+    found = trial(tmp_path, point(0, nonharmonic=0.096), *map(point, range(1, 4)))
+    assert found.levels(PLANNED).levels_m == pytest.approx(np.geomspace(1.2e-4, 8e-4, 4), rel=1e-3)
+
+
+def test_a_trip_is_the_reason_for_what_is_missing(tmp_path):
+    found = trial(tmp_path, point(0), point(1), point(2, Quality.INTERRUPTED), tripped=True)
+    assert found.missing == "force above its limit"
+    assert not found.is_disturbed
+    assert found.levels(PLANNED).levels_m[-1] == 2e-4
+
+
+def test_no_range_that_was_held_is_refused_with_the_reason(tmp_path):
+    found = trial(tmp_path, point(0), point(1, Quality.NOT_SETTLED, reason="not settled within 1000 periods"))
+    with refused(TuningError, "trial-of-plan-held"):
+        found.levels(PLANNED)
+    one = dataclasses.replace(PLANNED, levels_m=(1e-4,), needed_v=(0.1,), forces_n=(0.01,))
+    assert trial(tmp_path, point(0)).levels(one) is one
+
+
+@pytest.mark.parametrize("better", [True, False])
+def test_larger_levels_are_tried_where_rounding_disturbs_and_kept_if_they_are_better(tmp_path, monkeypatch, better):
+    few = PLANNED.within(1e-4, 1.5e-4, "rounding")
+    tuning = dataclasses.replace(tuned_once("magnet-beam"), levels=few, larger=PLANNED)
+    played = []
+
+    def carried_out(plan, bench, recording, options):
+        played.append(plan.levels_m)
+        recording.write_text(f"trial {len(played)}")
+        held = 3 if len(played) == 1 else 4 if better else 1
+        qualities = [Quality.GOOD] * held + [Quality.REJECTED] * (4 - held)
+        return trial(tmp_path, *map(point, range(4), qualities))
+
+    monkeypatch.setattr("rig.tuning.tuning.carried_out", carried_out)
+    found = try_plan(tuning, tmp_path / "tuned-trial.h5")
+    assert played == [few.levels_m, PLANNED.levels_m]
+    assert [path.name for path in tmp_path.iterdir()] == ["tuned-trial.h5"]
+    assert found.trial.recording == tmp_path / "tuned-trial.h5"
+    if better:
+        assert found.levels is PLANNED
+        assert found.trial.recording.read_text() == "trial 2"
+        assert "these are larger" in found.notes[-1]
+    else:
+        assert found.levels.levels_m[-1] == few.levels_m[2]
+        assert found.trial.recording.read_text() == "trial 1"
+
+
+def test_a_trial_ends_in_order_near_a_limit_and_the_plan_ends_below(tmp_path):
+    request = TuningRequest(level_rms_v=0.02, to_m=0.0037, points=4)  # 98 % of the limit at the channel of the magnet
+    tuning = tune("magnet-beam", tmp_path / "tuned.h5", request)
+    found = try_plan(tuning, tmp_path / "tuned-trial.h5", RunOptions(seed=3))
+    assert [point.quality.accepted for point in found.trial.points] == [True, True, True, False]
+    assert found.trial.points[3].quality is Quality.NEAR_LIMIT
+    assert not found.trial.tripped
+    assert found.levels.levels_m[-1] == tuning.levels.levels_m[2]
+    assert found.plan.levels_m == pytest.approx(found.levels.levels_m)
+    assert found.plan.near_limits == 0.9
+    with Recording(tmp_path / "tuned-trial.h5") as recording:
+        assert recording.parts[-1].information["about"]["purpose"] == "trial of a tuned plan"
+
+
+def test_the_command_says_what_the_trial_held_and_its_file_is_not_overwritten(command, tmp_path):
+    line = "tune --bench magnet-beam -o tuned.toml --level 0.02 --law phase --points 2 --rehearse 0 --json"
+    told = json.loads(command(line).succeeded().out)
+    assert told["trial"] == {
+        "recording": "tuned-trial.h5",
+        "accepted": 2,
+        "points": 2,
+        "held": [0, 1],
+        "missing": "",
+        "end": "the plan was carried out",
+        "tripped": False,
+    }
+    for name in ("tuned.toml", "tuned.h5"):
+        (tmp_path / name).unlink()
+    again = command(line)
+    assert again.status == 1
+    assert "tuned-trial.h5: exists already" in again.err
+    assert not (tmp_path / "tuned.h5").exists()  # nothing was driven
+
+
+def test_without_a_trial_only_the_multisine_is_driven(command, tmp_path):
+    line = "tune --bench magnet-beam -o tuned.toml --level 0.02 --law phase --points 2 --rehearse 0 --no-trial --json"
+    assert json.loads(command(line).succeeded().out)["trial"] is None
+    assert {path.name for path in tmp_path.iterdir()} == {"tuned.toml", "tuned.h5"}
+
+
+def test_a_run_that_was_stopped_is_no_trial(tmp_path, monkeypatch):
+    tuning = tuned_once("magnet-beam")
+    copied = shutil.copy(tuning.recording, tmp_path / "stopped.h5")  # a run with another end than a level out of reach
+    recording = Recording(copied)
+    monkeypatch.setattr(recording.parts[-1], "end", {"reason": "stop_requested", "text": "stopped by request"})
+    monkeypatch.setattr("rig.tuning.trial.run_plan", lambda *_: recording)
+    with refused(TrialEndedError, "trial-of-plan-stopped"):
+        try_plan(tuning, tmp_path / "tuned-trial.h5")
+
+
+def test_a_plan_whose_trial_was_stopped_is_written_untried(command, tmp_path, monkeypatch):
+    def stopped(*_):
+        raise TrialEndedError("trial of the plan: stopped by request")
+
+    monkeypatch.setattr("rig.tuning.tuning.carried_out", stopped)
+    told = command("tune --bench magnet-beam -o tuned.toml --level 0.02 --law phase --points 2 --rehearse 0")
+    assert told.status == 1
+    assert "the plan was written to tuned.toml; its trial is not complete" in told.err
+    assert load_plan("tuned.toml").levels_v is not None
+
+
+def test_a_plan_that_held_nothing_is_not_written(command, tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.tuning.tuning.carried_out", lambda *_: trial(tmp_path, point(0, Quality.NOT_SETTLED)))
+    told = command("tune --bench magnet-beam -o tuned.toml --level 0.02 --law phase --points 2 --rehearse 0")
+    assert told.status == 1
+    assert "held 0 of 2 levels" in told.err
+    assert not (tmp_path / "tuned.toml").exists()
+
+
+def test_the_recording_of_the_multisine_is_none_of_the_other_results(command, tmp_path):
+    told = command("tune --bench magnet-beam -o tuned.toml --recording tuned-trial.h5")
+    assert told.status == 1
+    assert "--recording tuned-trial.h5: tuned-trial.h5 is another result of this command" in told.err
+    assert not list(tmp_path.iterdir())
