@@ -85,17 +85,20 @@ def fitted(
         return np.concatenate([error.real, error.imag, of_prior], axis=1).T
 
     starts = [start] if exciter_prior is None else [start, _light(start)]
-    fits = [
-        least_squares(
-            residuals,
-            begin,
-            jac=jacobian_of,
-            method="lm",
-            x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
-            max_nfev=MOST_STEPS,
-        )
-        for begin in starts
-    ]
+    try:
+        fits = [
+            least_squares(
+                residuals,
+                begin,
+                jac=jacobian_of,
+                method="lm",
+                x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
+                max_nfev=MOST_STEPS,
+            )
+            for begin in starts
+        ]
+    except OverflowError:  # a mode of no or infinite damping fits best
+        raise ValueError(NO_RESONANCE) from None
     found = min(fits, key=lambda fit: float(fit.cost))
     x = found.x
     weights, jacobian = np.stack([weight_f, weight_a]), np.asarray(found.jac)

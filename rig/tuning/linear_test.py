@@ -5,6 +5,7 @@ All levels go through the ordinary runner into one recording; each further level
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,17 +106,17 @@ def measure(
         runs.listen(level_rms_v)
         tried = (level_rms_v,)
         _audible(bench, level_rms_v, runs.coherence, "at the level asked for")
-    damping_ratio = _damping(runs, tried[-1], damping_of)
+    level, damping_ratio = _level_with_a_mode(runs, tried, damping_of)
     resolution = 2.0 * damping_ratio * bench.specimen.linear_frequency_hz / LINES_PER_BANDWIDTH
     # the damping of a resonance between two lines is a guess
     resolution = max(resolution, _coarse(bench) / MAX_REFINEMENT)
-    found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), REALISATIONS)
+    found = runs.at(level, _on_samples(bench, min(resolution, _coarse(bench))), REALISATIONS)
     matrix = voltage_responses(bench, found)
     around = near(bench, matrix.frequency_hz)
     nonlinear = np.maximum(matrix.total_std[around, 0, 0] ** 2 - matrix.noise_std[around, 0, 0] ** 2, 0.0)
     noise = densities(bench, found)
     return LinearTest(
-        level_rms_v=tried[-1],
+        level_rms_v=level,
         responses=matrix,
         lead_samples=runs.lead_samples,
         coherence=coherence_of(bench, found),
@@ -129,16 +130,26 @@ def measure(
     )
 
 
-def _damping(runs: "_Runs", level_rms_v: float, damping_of: Callable[[FrequencyResponseMatrix, float], float]) -> float:
-    """Damping ratio from the responses of the search; where these show none, from one realisation of finer lines.
+def _level_with_a_mode(
+    runs: "_Runs", tried: tuple[float, ...], damping_of: Callable[[FrequencyResponseMatrix, float], float]
+) -> tuple[float, float]:
+    """Return the highest level of the search whose responses show a mode, V RMS, and the mode's damping ratio.
 
-    A light resonance lies between two lines of the search.
+    Where the responses of the last level show none, one realisation of finer lines is played at this level, then at lower ones:
+    a light resonance lies between two lines of the search, and where a stop is met, a higher level shows no mode. Raises the
+    `TuningError` of the last level if no level shows one.
     """
-    try:
-        return damping_of(voltage_responses(runs.bench, runs.measured), runs.lead_samples)
-    except TuningError:
-        found = runs.at(level_rms_v, _on_samples(runs.bench, _coarse(runs.bench) / REFINEMENT), 1)
-        return damping_of(voltage_responses(runs.bench, found), runs.lead_samples)
+    last = tried[-1]
+    with suppress(TuningError):
+        return last, damping_of(voltage_responses(runs.bench, runs.measured), runs.lead_samples)
+    refusals = []
+    for level in [last, *(level for level in reversed(tried) if level < last)]:
+        found = runs.at(level, _on_samples(runs.bench, _coarse(runs.bench) / REFINEMENT), 1)
+        try:
+            return level, damping_of(voltage_responses(runs.bench, found), runs.lead_samples)
+        except TuningError as refusal:
+            refusals.append(refusal)
+    raise refusals[0]
 
 
 def expected_duration(bench: Bench, *, by_the_clock: bool) -> str:

@@ -28,14 +28,14 @@ def test_a_resonance_between_two_lines_of_the_search_is_looked_for_with_finer_on
             raise TuningError("no mode")
         return 3e-4
 
-    assert linear_test._damping(runs, 0.02, damping_of) == 3e-4
+    assert linear_test._level_with_a_mode(runs, (0.01, 0.02), damping_of) == (0.02, 3e-4)
     [(level, resolution, realisations)] = runs.played
     assert (level, realisations) == (0.02, 1)
     assert resolution == pytest.approx(25.0 / LINES / REFINEMENT, rel=1e-3)
 
 
 def test_where_the_search_shows_the_resonance_nothing_further_is_played(runs):
-    assert linear_test._damping(runs, 0.02, lambda responses, lead: 0.01) == 0.01
+    assert linear_test._level_with_a_mode(runs, (0.01, 0.02), lambda responses, lead: 0.01) == (0.02, 0.01)
     assert runs.played == []
 
 
@@ -44,8 +44,21 @@ def test_a_rig_without_a_mode_is_refused_after_the_finer_lines(runs):
         raise TuningError("no mode")
 
     with pytest.raises(TuningError, match=r"^no mode$"):
-        linear_test._damping(runs, 0.02, damping_of)
+        linear_test._level_with_a_mode(runs, (0.02,), damping_of)
     assert len(runs.played) == 1
+
+
+def test_a_lower_level_of_the_search_is_taken_where_higher_ones_show_no_mode(runs):
+    """The search tripped at 0.04 V, which is not played again."""
+
+    def damping_of(responses, lead_samples):
+        if not runs.played or runs.played[-1][0] > 0.01:
+            raise TuningError("no mode")
+        return 3e-4
+
+    found = linear_test._level_with_a_mode(runs, (0.04, 0.01, 0.015, 0.02), damping_of)
+    assert found == (0.01, 3e-4)
+    assert [level for level, _, _ in runs.played] == [0.02, 0.015, 0.01]
 
 
 def _ended(reason):
