@@ -135,7 +135,8 @@ def test_a_silent_device_ends_the_run_and_is_told_to_stop(device):
 def test_pieces_beyond_the_records_are_left_out(device):
     loop, _ = started(device)
     before = [array.tobytes() for array in loop.tick.arrays]
-    loop._note(State(0, (Record(200, 0, b"1234"), Record(9, 1 << 30, b"1234"), Record(9, 94, b"1234"))))
+    across_its_end = loop.tick.arrays[9].nbytes - 2
+    loop._note(State(0, (Record(200, 0, b"1234"), Record(9, 1 << 30, b"1234"), Record(9, across_its_end, b"1234"))))
     assert [array.tobytes() for array in loop.tick.arrays] == before
 
 
