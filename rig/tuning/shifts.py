@@ -16,7 +16,9 @@ SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a 
 MIN_PROMINENCE = 3.0  # of a mode's peak over the lowest response between it and the tested mode
 RAMP_TIME_CONSTANTS = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
 MIN_RAMP, MAX_RAMP = 20.0, 300.0  # ramps, periods
-START_SHARE = 0.25  # of the force limit, on the way to the start voltage; chosen: stiff springs double the linear force
+START_SHARES = (0.25, 0.5)
+"""Of the force limit, on the way to the start voltage: the second where the first gives no force that can be read; chosen:
+stiff springs double the linear force."""
 START_REACH = 0.03  # distance from resonance at which a run may begin, relative: tunings were off by up to 1 %
 READABLE = 5.0  # force at the start over the least whose phase is read (0.4 bits): rounding disturbs fewer bits; chosen
 MIN_START, MAX_START = 40.0, 600.0  # periods
@@ -110,14 +112,14 @@ class Start(NamedTuple):
 def start_of(bench: Bench, plant: PlantModel, needed_v: float) -> Start:
     """Return the voltage that sets the rig in motion, ``needed_v`` (V peak) of the lowest level or less, and the ramp to it.
 
-    The force on the way there may reach a quarter of the bench's limit (`largest_start_force`). The ramp is the shortest of
-    some whose voltage then gives a force at resonance that can be read, or that of the lowest level.
+    The force on the way there may reach a quarter of the bench's limit (`largest_start_force`), or half. The ramp is the
+    shortest of some whose voltage then gives a force at resonance that can be read, or that of the lowest level.
     """
     force = bench.channels[bench.index_of("force")]
     readable_v = min(needed_v, READABLE * SMALLEST_BITS * force.resolution_in_unit * plant.volts_per_newton())
-    allowed_n = START_SHARE * bench.limits.force_n
-    starts = (Start(min(needed_v, allowed_n / largest_start_force(plant, ramp)), ramp) for ramp in START_RAMPS)
-    return next(start for start in starts if start.voltage_v >= readable_v or start.ramp_periods == START_RAMPS[-1])
+    most_v = {ramp: bench.limits.force_n / largest_start_force(plant, ramp) for ramp in START_RAMPS}
+    starts = [Start(min(needed_v, share * most_v[ramp]), ramp) for share in START_SHARES for ramp in START_RAMPS]
+    return next((start for start in starts if start.voltage_v >= readable_v), starts[-1])
 
 
 def largest_start_force(plant: PlantModel, ramp_periods: float) -> float:

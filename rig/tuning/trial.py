@@ -13,7 +13,6 @@ from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.running.runner import run_plan
-from rig.tick.safety.layout import EndReason
 from rig.tuning.levels import LevelChoice
 from rig.tuning.linear_test import LIMITS
 from rig.tuning.plant import TuningError
@@ -21,11 +20,13 @@ from rig.tuning.plant import TuningError
 PURPOSE = "trial of a tuned plan"  # purpose of its recording, in the facts of its parts
 IN_ORDER = (
     "completed",
+    "plan_stopped",
+    "no_lock",
+    "no_lock_in_window",
     *LIMITS,
-    *(
-        reason.name.lower()
-        for reason in (EndReason.PLAN_STOPPED, EndReason.OVERTRAVEL, EndReason.OVER_LEVEL, EndReason.LOST_LOCK)
-    ),
+    "overtravel",
+    "over_level",
+    "lost_lock",
 )
 """Ends of a trial that say how far the levels reach; any other end says something of the rig, or of who stopped it."""
 MIN_HELD_SPAN = 1.15  # highest level over lowest that a trial has to hold, if more was planned; chosen

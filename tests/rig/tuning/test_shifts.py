@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.bench import load_bench
-from rig.tuning.shifts import START_SHARE, frequency_window, largest_start_force, other_modes, ramp_periods, start_of
+from rig.tuning.shifts import START_SHARES, frequency_window, largest_start_force, other_modes, ramp_periods, start_of
 from tests.controller.tuning.rigs import plant_of
 
 HERTZ = 24.37
@@ -102,11 +102,15 @@ def test_where_the_force_of_a_start_could_not_be_read_its_ramp_is_longer():
     bench = with_force_limit(0.1)
     assert start_of(with_force_limit(10.0), plant, 1.0) == (1.0, 10.0)
     force = bench.channels[bench.index_of("force")]
-    quick, slow = (START_SHARE * 0.1 / largest_start_force(plant, ramp) for ramp in (10.0, 300.0))
+    quick, slow = (START_SHARES[0] * 0.1 / largest_start_force(plant, ramp) for ramp in (10.0, 300.0))
     assert slow > 1.05 * quick
     wanted_n = 0.5 * (quick + slow) / plant.volts_per_newton()
     coarse = force.model_copy(update={"resolution_v": 0.5 * wanted_n * force.resolution_v / force.resolution_in_unit})
     channels = tuple(coarse if one.name == force.name else one for one in bench.channels)
     start = start_of(bench.model_copy(update={"channels": channels}), plant, 1.0)
     assert start.ramp_periods > 10.0
-    assert start.voltage_v >= 0.5 * (quick + slow)
+    assert 0.5 * (quick + slow) <= start.voltage_v <= slow
+    unreadable = coarse.model_copy(update={"resolution_v": 2.0 * coarse.resolution_v})
+    channels = tuple(unreadable if one.name == force.name else one for one in bench.channels)
+    start = start_of(bench.model_copy(update={"channels": channels}), plant, 1.0)
+    assert slow < start.voltage_v <= 2.0 * slow  # half of the limit in place of a quarter

@@ -11,9 +11,10 @@ from rig.arming.run_options import RunOptions
 from rig.campaigns.evaluation.point import Point, Purity, Quality, Spectrum, Vibration
 from rig.campaigns.plans import load_plan
 from rig.recording.reader import Recording
+from rig.tick.safety.layout import EndReason
 from rig.tuning import TuningError, TuningRequest, try_plan, tune
 from rig.tuning.levels import LevelChoice
-from rig.tuning.trial import PlanTrial, TrialEndedError
+from rig.tuning.trial import IN_ORDER, PlanTrial, TrialEndedError
 from tests.refused import refused
 from tests.rig.tuning.tuned import tuned_once
 
@@ -212,3 +213,7 @@ def test_the_recording_of_the_multisine_is_none_of_the_other_results(command, tm
     assert told.status == 1
     assert "--recording tuned-trial.h5: tuned-trial.h5 is another result of this command" in told.err
     assert not list(tmp_path.iterdir())
+
+
+def test_the_ends_that_tell_of_a_plan_are_ends_of_runs():
+    assert set(IN_ORDER) <= {reason.name.lower() for reason in EndReason}
