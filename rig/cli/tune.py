@@ -63,13 +63,12 @@ def tune_(
     """Measure a rig with a low-level multisine, design gains and levels, try them once, write the plan, and rehearse it."""
     from rig.bench import load_bench
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
-    from rig.errors import ConfigurationError, RigError
+    from rig.errors import ConfigurationError
     from rig.rehearsal.report import verdict_in_one_line
     from rig.show.waiting import Waiting
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure, draw_tuning
     from rig.tuning.linear_test import expected_duration
-    from rig.tuning.plant import TuningError
     from rig.tuning.report import lines, summary
     from rig.tuning.tuning import TuningRequest, tune
     from vibrolock.printable import printable
@@ -86,14 +85,9 @@ def tune_(
     if recorded.suffix != ".h5":
         raise ConfigurationError(f"--recording {recorded}: recordings are written as .h5")
     tried, rehearsed = (output.with_name(f"{output.stem}-{what}.h5") for what in ("trial", "rehearsal"))
-    written = [tried] if trial else []
-    written += [rehearsed] if rehearse else []
-    for path in written:
-        if path.absolute() == recorded.absolute():
-            raise ConfigurationError(
-                f"--recording {recorded}: {path.name} is another result of this command, choose another name"
-            )
-        keep_existing([], path, options.overwrite)
+    for path, wanted in ((tried, trial), (rehearsed, rehearse > 0)):
+        if wanted:
+            _check_result(path, recorded, options.overwrite)
     if figure is not None:
         check_figure(figure, options.overwrite)
     then = f"{', then a trial of the plan' if trial else ''}{', then a rehearsal' if rehearse else ''}"
@@ -105,13 +99,7 @@ def tune_(
     ):
         found = tune(bench, recorded, request, watched, named=_as_seen_from(bench, output))
     if trial:
-        try:
-            found = _tried(found, tried, options, clock)
-        except (RigError, OSError, KeyboardInterrupt, SystemExit) as error:
-            if type(error) is not TuningError:  # which says that the plan is none
-                _write(found, output)
-                print(f"the plan was written to {output}; its trial is not complete", file=sys.stderr)
-            raise
+        found = _tried(found, output, tried, options, clock)
     _write(found, output)
     if figure is not None:
         draw_tuning(found, figure)
@@ -137,10 +125,24 @@ def _write(found: "Tuning", plan: Path, *head: str) -> None:
         part.write_text("\n".join([*head, found.plan_toml]), encoding="utf-8")
 
 
-def _tried(found: "Tuning", recording: Path, options: "RunOptions", by_the_clock: bool) -> "Tuning":
+def _check_result(path: Path, recorded: Path, overwrite: bool) -> None:
+    """Refuse a result that is the recording of the multisine, or that exists."""
+    from rig.errors import ConfigurationError
+
+    if path.absolute() == recorded.absolute():
+        raise ConfigurationError(
+            f"--recording {recorded}: {path.name} is another result of this command, choose another name"
+        )
+    keep_existing([], path, overwrite)
+
+
+def _tried(found: "Tuning", plan: Path, recording: Path, options: "RunOptions", by_the_clock: bool) -> "Tuning":
+    """Try the plan; where the trial does not come to its end, write it untried."""
     from rig.campaigns.backbone.points import BACKBONE_COLUMNS
     from rig.campaigns.running.dry_run import expected_duration
+    from rig.errors import RigError
     from rig.show.waiting import Waiting
+    from rig.tuning.plant import TuningError
     from rig.tuning.tuning import try_plan
 
     usual = expected_duration(found.plan, found.bench, by_the_clock=by_the_clock)
@@ -148,7 +150,13 @@ def _tried(found: "Tuning", recording: Path, options: "RunOptions", by_the_clock
         Waiting("a trial of the plan, up to its highest level", usual, announced=by_the_clock),
         shown(options, BACKBONE_COLUMNS) as watched,
     ):
-        return try_plan(found, recording, watched)
+        try:
+            return try_plan(found, recording, watched)
+        except (RigError, OSError, KeyboardInterrupt, SystemExit) as error:
+            if type(error) is not TuningError:  # which says that no plan suits
+                _write(found, plan)
+                print(f"the plan was written to {plan}; its trial is not complete", file=sys.stderr)
+            raise
 
 
 def _rehearsal(found: "Tuning", plan: Path, rehearsed: Path, draws: int) -> "Summary":

@@ -88,8 +88,10 @@ class PlanTrial:
     def missing(self) -> str:
         """The first level that was not held, and why; empty if all were."""
         point = self._first_missing()
-        if point is None or point.quality is Quality.INTERRUPTED:
+        if point is None:
             return self.end if self.tripped else ""
+        if point.quality is Quality.INTERRUPTED:
+            return self.end
         why = self._spoiling(point) if point.accepted else point.reason or str(point.quality)
         return f"level {point.number + 1}: {why}"
 
