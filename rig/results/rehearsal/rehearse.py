@@ -22,6 +22,7 @@ from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalRequest, d
 from rig.rehearsal.remedies import improve
 from rig.results.files import load, save
 from rig.results.kinds import KINDS
+from rig.system.stop_signals import ended_in_order
 from rig.text.durations import duration
 
 START_S = 10.0  # s until the processes of a rehearsal are at work; measured on two cores
@@ -98,6 +99,7 @@ def _opened(paths: Sequence[Path]) -> Iterator[dict[str, object]]:
         yield found
 
 
+@ended_in_order()
 def rehearse_into(
     request: RehearsalRequest,
     output: Path,
