@@ -31,6 +31,7 @@ SEARCHING, ACQUIRING, LOCKED, LOST = (int(state) for state in LockState)
 MOST_SLOWING, FORETOLD_SLOWING = 0.95, 0.8
 """Part of its rate that a ramp loses on the steepest backbone, and on one that is foretold to be so; chosen: it still gets
 there, and takes not much longer where a stop makes the backbone steep at once and then no more."""
+MOST_LAG_SLOWING = 0.85  # part of its rate that a ramp loses by the lag that it has had; chosen: seven times as long
 STEEP_PERIODS = 3  # in a row: one disturbed period ends no ramp; chosen: beyond a fold a vibration jumps within ten
 SWINGING = 3  # times as many far periods, less close ones, lose a lock whose phase swings to and fro
 
@@ -41,14 +42,15 @@ THRESHOLDS = record(
 
 LOCK = record(
     i8="state in_band_periods out_of_band_periods net_out_of_band_periods gained side swings steep_periods",
-    f8="slowing steep_slowing",
+    f8="slowing steep_slowing lag_slowing begun_slowing largest_lag",
 )
 """State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
 ``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``gained``: there has been a lock
 before; ``side``: sign of the last error out of the band, and ``swings``: how often it has changed, in a ramp that waits, since
 the last lock; ``slowing``: by how much of its rate, 0 to 1, the error of the present period makes an upward ramp slower;
-``steep_slowing``: the same by the slope of the backbone; ``steep_periods``: in a row, in a ramp up on a backbone steeper than
-the gains bear."""
+``steep_slowing``: the same by the slope of the backbone, and ``lag_slowing`` by ``largest_lag``, the largest error in this ramp
+over the one from which it is slower; ``begun_slowing``: ``lag_slowing`` where this ramp began, by the lag in the one before;
+``steep_periods``: in a row, in a ramp up on a backbone steeper than the gains bear."""
 
 
 class LockRule(Settings):
@@ -112,7 +114,11 @@ def next_lock_state(
     if lock.state == SEARCHING:
         lock.state = ACQUIRING
     lock.in_band_periods = lock.in_band_periods + 1 if size < thresholds.locked_rad else 0
-    lock.slowing = min(max(2.0 * size / thresholds.waiting_rad - 1.0, 0.0), 1.0)
+    lag = 2.0 * size / thresholds.waiting_rad
+    lock.slowing = min(max(lag - 1.0, 0.0), 1.0)
+    if waits:
+        lock.largest_lag = max(lock.largest_lag, lag)
+        lock.lag_slowing = max(lock.begun_slowing, slowing_for_lag(lock))
     if waits and size > thresholds.lost_rad:
         side = 1 if error > 0.0 else -1
         lock.swings += 1 if lock.side == -side else 0
@@ -152,6 +158,27 @@ def mind_steepness(lock: Record, here: float, ahead: float) -> None:
     lock.steep_periods = lock.steep_periods + 1 if here > 1.0 else 0
     if lock.steep_periods >= STEEP_PERIODS:
         lock.state = LOST
+
+
+@kernel
+def slowing_for_lag(lock: Record) -> float:
+    """Return by how much of its rate a ramp has to be slower for its lag, which grows with the rate, not to slow it again."""
+    if lock.largest_lag <= 1.0 - lock.begun_slowing:
+        return 0.0
+    return float(min(1.0 - (1.0 - lock.begun_slowing) / lock.largest_lag, MOST_LAG_SLOWING))
+
+
+@kernel
+def forget_lag(lock: Record) -> None:
+    """Forget the lag of the present ramp, which a fault of the device has made."""
+    lock.largest_lag, lock.lag_slowing = 0.0, lock.begun_slowing
+
+
+@kernel
+def begin_ramp(lock: Record) -> None:
+    """Begin a ramp at the rate that the lag in the one before allows."""
+    lock.begun_slowing = lock.lag_slowing = slowing_for_lag(lock)
+    lock.largest_lag = 0.0
 
 
 @kernel

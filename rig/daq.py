@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import Enum
-from typing import ClassVar, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -177,7 +177,7 @@ class DAQ(ABC):
         exception of a driver becomes a `DaqError`.
     """
 
-    wall_clock: ClassVar[bool] = True
+    wall_clock: bool = True
     """Whether the device has its own clock, so that its loop should run in a separate process."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float, output_range_v: float) -> None:

@@ -7,6 +7,9 @@ import uuid
 # One thread for linear algebra, before numpy is imported. The matrices of the tests are small: on a busy machine threads that
 # wait for each other make an identification ten times slower.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# One job where a command takes one for each core: pytest's workers have the cores already, and a worker of joblib takes two
+# seconds of a processor to load the product. A test of several jobs asks for them.
+os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
 
 from pathlib import Path
 

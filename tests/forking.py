@@ -41,7 +41,10 @@ FORKED = "# forked from a process that has loaded the product\n"
 MAIN = "from rig/cli import main; main()".replace("/", ".")
 COMMANDS = (MAIN, f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {MAIN}")
 """Other programs that are."""
-PASSED_ON = ("VIBROLOCK_", "XDG_", "PYTEST_", "HOME", "PYTHONPATH", "TMPDIR", "DISPLAY", "DBUS_", "JACK_")
+PASSED_ON = (
+    *("VIBROLOCK_", "XDG_", "PYTEST_", "HOME", "PYTHONPATH", "TMPDIR", "DISPLAY", "DBUS_", "JACK_"),
+    *("TERM", "COLUMNS", "LINES"),
+)
 """Beginnings of names of the environment that no library reads when it is loaded."""
 SUBREAPER = 36
 """PR_SET_CHILD_SUBREAPER of <sys/prctl.h>: orphans among the descendants become children of this process."""
@@ -72,6 +75,7 @@ def fresh() -> Iterator[None]:
 
 def is_meant(line: object) -> bool:
     """Whether a command is one of Python's that is forked."""
+    line = list(line) if isinstance(line, tuple) else line  # asyncio's
     if _is_fresh or not isinstance(line, list) or line[:1] != [sys.executable]:
         return False
     words = line[2:] if line[1:2] == ["-P"] else line[1:]

@@ -59,6 +59,7 @@ def tracked(*folders):
                 yield path.relative_to(ROOT).as_posix()
 
 
+@pytest.mark.slow
 def test_a_wheel_holds_all_modules_benches_plans_specimens_the_page_templates_and_type_markers(built):
     names = set(zipfile.ZipFile(built[0]).namelist())
     wanted = {name for name in tracked(*PACKAGES) if not name.endswith((".nbi", ".nbc"))}
@@ -108,6 +109,7 @@ def _in(empty, folder, name, *arguments):
     return _run([str(empty / name), *arguments], folder, env=_alone())
 
 
+@pytest.mark.slow
 def test_commands_and_their_help_work_from_the_wheel(empty, tmp_path):
     assert "Phase-locked nonlinear vibration tests" in _in(empty, tmp_path, "rig", "--help")
     where = _in(empty, tmp_path, "python", "-c", "import rig; print(rig.__file__)")
@@ -123,6 +125,7 @@ print(len(group.commands))
     assert int(_in(empty, tmp_path, "python", "-c", helps).split()[-1]) > 20
 
 
+@pytest.mark.slow
 def test_new_files_and_shipped_ones_come_from_the_wheel(empty, tmp_path):
     assert "magnet-beam/backbone" in _in(empty, tmp_path, "rig", "list")
     _in(empty, tmp_path, "rig", "new", "driver", "-o", "box")
@@ -132,6 +135,7 @@ def test_new_files_and_shipped_ones_come_from_the_wheel(empty, tmp_path):
     assert schema["properties"]["name"]["description"] == "Name, used in messages and files."
 
 
+@pytest.mark.slow
 def test_studies_are_a_wheel_of_their_own_that_brings_their_commands(empty, tmp_path):
     assert "pip install ./studies" in _in(empty, tmp_path, "rig", "reproduce", "--help")
     _run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)], ROOT / "studies")

@@ -104,6 +104,7 @@ def test_the_first_of_a_kind_is_started_as_a_user_starts_it():
 def test_what_is_fresh_or_unknown_is_started():
     command = [sys.executable, "-c", COMMANDS[0]]
     assert is_meant(command)
+    assert is_meant(tuple(command))  # of asyncio
     with fresh():
         assert not is_meant(command)
     assert not is_meant([sys.executable, "-c", "import rig"])

@@ -32,6 +32,7 @@ def ask(folder: Path) -> None:
     assert (made_once(folder, note) / "file").read_text() == "whole"
 
 
+@pytest.mark.slow
 def test_of_several_processes_that_ask_at_once_one_makes_the_folder(tmp_path):
     spawn = multiprocessing.get_context("spawn")
     asking = [spawn.Process(target=ask, args=(tmp_path / "folder",)) for _ in range(3)]

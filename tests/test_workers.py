@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from joblib import Parallel, delayed
 from joblib.externals.loky import get_reusable_executor
 
@@ -11,6 +12,7 @@ def stand(_: int) -> str:
     return str(Path.cwd())
 
 
+@pytest.mark.slow
 def test_workers_may_be_started_in_a_folder_that_goes(tmp_path, monkeypatch):
     get_reusable_executor().shutdown()  # of tests before, in the folder of the tests
     (tmp_path / "here").mkdir()

@@ -16,11 +16,13 @@ def _array_at(typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
         from numba.np.arrayobj import np_cfarray  # only compiling needs it
 
         make: Any = np_cfarray
-        place = builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+        place = arguments[0]
+        if isinstance(address, _types.Integer):
+            place = builder.inttoptr(place, ir.IntType(8).as_pointer())
         return make(context, builder, array(_types.voidptr, shape), (place, arguments[1]))
 
     return array(address, shape, dtype), generate
 
 
 array_at: Any = intrinsic(_array_at)
-"""``array_at(address, shape, dtype)``: the C-contiguous array at an address, valid as long as its owner lives."""
+"""``array_at(address, shape, dtype)``: the C-contiguous array at an address or a pointer, valid as long as its owner lives."""

@@ -17,3 +17,12 @@ def record(*arrays: tuple[Any, ...], **scalars: str) -> np.dtype[np.void]:
     ``record(("means", "f8", (4,)), i8="count state", f8="mean")``
     """
     return np.dtype([*((name, kind) for kind, names in scalars.items() for name in names.split()), *arrays])
+
+
+def undivided(rows: np.ndarray) -> np.ndarray:
+    """Return a view of contiguous rows whose elements are bytes: numpy copies them some ten times as quickly as field by field.
+
+    ``rows`` [n] of a structured dtype, or [n, k] of numbers, one element a row.
+    """
+    size = rows.dtype.itemsize * (rows.shape[1] if rows.ndim == 2 else 1)
+    return rows.view(f"V{size}").reshape(rows.shape[0])

@@ -23,6 +23,7 @@ from numba.core.sigutils import normalize_signature
 from vibrolock.compiling import on_compiling
 from vibrolock.content_digest import content_digest
 from vibrolock.kernel_cache import kernel_cache_folder, note_use
+from vibrolock.kernel_compilers import InnerCompiler, KernelCompiler, restored
 
 if sys.platform != "win32":
     import fcntl
@@ -58,7 +59,7 @@ setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (ma
 
 def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Return numba's dispatcher of a kernel, cached on disk; return the function itself if numba is told not to compile."""
-    made: Any = numba.njit(**options)(function)
+    made: Any = numba.njit(**{"pipeline_class": KernelCompiler, "no_cfunc_wrapper": True, **options})(function)
     if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         made._cache = _ContentCache(made)
     return made
@@ -70,7 +71,7 @@ def inner_dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> A
     It has no entries for Python and C. A constant among the arguments is taken as a number like any other: numba would compile
     the kernel anew for each.
     """
-    made = dispatcher(function, {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
+    made = dispatcher(function, {**options, "no_cpython_wrapper": True, "pipeline_class": InnerCompiler})
     template: Any = made.get_call_template
     plain: Any = numba.types.unliteral
 
@@ -81,18 +82,20 @@ def inner_dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> A
     return made
 
 
-def c_function(signature: str) -> Callable[[Callable[..., Any]], Any]:
+def c_function(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles a C function of a signature at once, or loads its machine code like a kernel's.
 
-    The function allocates nothing. ``numba.cfunc`` would first make all of numba's own implementations known, a third of a
-    second, even where it only loads.
+    ``signature`` is numba's, or its text; ``options`` are numba's too. The function allocates nothing. ``numba.cfunc`` would
+    first make all of numba's own implementations known, a third of a second, even where it only loads.
     """
     normalized: Any = normalize_signature
-    options = {"_nrt": False}  # it allocates nothing; what counts references is not loaded
+    options = {"_nrt": False, **options}  # it allocates nothing; what counts references is not loaded
 
     def decorate(function: Callable[..., Any]) -> Any:
         made: Any = CFunc(function, normalized(signature), locals={}, options=options)
-        made._cache = _ContentCache(SimpleNamespace(py_func=function, targetoptions={**options, "cfunc": signature}))
+        made._cache = _ContentCache(
+            SimpleNamespace(py_func=function, targetoptions={**options, "cfunc": str(signature)})
+        )
         made.compile()
         return made
 
@@ -140,6 +143,9 @@ class _ContentLocator:
 
 class _ContentImpl(CompileResultCacheImpl):
     _locator_classes: list[type[object]] = [_ContentLocator]  # noqa: RUF012
+
+    def rebuild(self, context: Any, stored: Any) -> Any:
+        return restored(context, stored) or super().rebuild(context, stored)  # type: ignore[no-untyped-call]
 
 
 class _ContentCache(FunctionCache):

@@ -21,7 +21,7 @@ def content_digest(kernel: Any) -> str:
     """
     known: str | None = getattr(kernel, "_content_digest", None)
     if known is None:
-        digest = hashlib.sha256(b"2")  # machine code of digests without it may lack the entry for Python
+        digest = hashlib.sha256(b"3")  # under earlier ones code may lack the entry for Python, or text be machine code
         for part in _content(kernel, set()):
             digest.update(part.encode())
             digest.update(b"\0")

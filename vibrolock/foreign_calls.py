@@ -1,4 +1,4 @@
-"""For kernels that the code of others calls, in a thread of its own and without Python: arrays in shared memory, and a fence.
+"""For kernels that the code of others calls, in a thread of its own and without Python: pointers, and a fence.
 
 Importing this module loads numba.
 """
@@ -7,17 +7,15 @@ import ctypes
 from collections.abc import Callable
 from typing import Any
 
-import numba
 from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
+from vibrolock.content_cache import c_function
+
 POINTER, DOUBLE, INT = types.voidptr, types.float64, types.int32
 UNSIGNED_LONG = types.uint64 if ctypes.sizeof(ctypes.c_ulong) == 8 else types.uint32
 """Types of C on this system."""
-
-array_at: Any = numba.carray  # type: ignore[attr-defined]  # made at run time
-"""``array_at(pointer, shape, dtype)`` in a kernel: the array at a pointer."""
 
 
 def _fence(_: Any) -> Any:
@@ -44,9 +42,5 @@ pointer: Any = intrinsic(_pointer)
 
 
 def compiled_for_c(function: Callable[..., Any], result: Any, *arguments: Any) -> Any:
-    """Return a function compiled for C; its ``address`` is valid as long as it lives.
-
-    It is compiled anew in each process: numba finds stored machine code by the file of the function alone, and what it calls
-    may have changed since.
-    """
-    return numba.cfunc(result(*arguments), error_model="numpy")(function)
+    """Return a function compiled for C, or its stored machine code; its ``address`` is valid as long as it lives."""
+    return c_function(result(*arguments), error_model="numpy")(function)

@@ -1,7 +1,8 @@
 """Calls in the workers of joblib, whose results are taken as they come; who has enough may stop."""
 
 import traceback
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
 from itertools import takewhile
 from threading import Event
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -37,6 +38,27 @@ def results_of(
     finally:
         enough.set()
         for _ in found:
+            pass
+
+
+@contextmanager
+def meanwhile(function: Callable[[], object], n_jobs: int | None = None) -> Iterator[None]:
+    """Let each worker call a function, such as one that loads what its next calls need, while this process does something else.
+
+    At its end the context waits for the workers, also after an error. ``n_jobs`` is that of the calls that follow; with one job
+    nothing is called.
+    """
+    from joblib import Parallel, delayed, effective_n_jobs
+
+    workers = effective_n_jobs(n_jobs)
+    if workers == 1:
+        yield
+        return
+    begun = Parallel(n_jobs=n_jobs, batch_size=1, return_as="generator")(delayed(function)() for _ in range(workers))
+    try:
+        yield
+    finally:
+        for _ in begun:
             pass
 
 

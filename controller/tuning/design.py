@@ -204,7 +204,7 @@ def _reasons(
         out.append(f"the {kind} is barely stable {where}: max |S| = {peak:.2f}, allowed is {POOR_SENSITIVITY:g}")
     if loop.plant.fit_error > POOR_FIT:
         out.append(
-            f"the plant model differs from its measurement by {100.0 * loop.plant.fit_error:.0f} %, "
+            f"the plant model differs from its measurement by {100.0 * loop.plant.fit_error:.3g} %, "
             f"allowed is {100.0 * POOR_FIT:.0f} %: another mode inside the band, or a nonlinear or noisy test"
         )
     if loop.plant.coupled_pole_rad_s.real >= 0.0:

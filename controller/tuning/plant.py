@@ -24,6 +24,10 @@ from vibrolock.errors import InputError
 
 STANDARD_ERRORS = ("frequency_std_rad_s", "damping_ratio_std", "drive_shape_std", "force_v_n_std")
 
+SLOWEST_POLE = (
+    0.2  # of the mode's frequency, below which nothing is fitted; chosen: a third of the band's lowest frequency
+)
+
 
 @dataclass(frozen=True, kw_only=True)
 class PlantModel:
@@ -46,7 +50,7 @@ class PlantModel:
     band_hz: tuple[float, float]
     """Frequency band of the fit."""
     fit_error: float
-    """Largest of the two relative errors (root mean square over the band) of H_F and H_A."""
+    """Largest of the two relative errors (root mean square over the band) of H_F and H_A that noise does not explain."""
     sample_rate_hz: float
     """Sample rate of the loop."""
     latency_samples: float
@@ -119,9 +123,15 @@ class PlantModel:
 
     @property
     def coupled_pole_rad_s(self) -> complex:
-        """The pole of the coupled plant (1/s) that is nearest to the mode of the structure."""
-        poles = self.poles_rad_s
-        return complex(poles[np.argmin(np.abs(poles - 1j * self.frequency_rad_s))])
+        """The pole of the coupled plant (1/s) that is nearest to the mode of the structure.
+
+        Poles of less than `SLOWEST_POLE` of its frequency belong to the fit: where exciter and structure together are
+        overdamped, they are nearer than those of the rig.
+        """
+        poles, omega = self.poles_rad_s, self.frequency_rad_s
+        distance = np.abs(poles - 1j * omega)
+        quick = np.abs(poles) > SLOWEST_POLE * omega
+        return complex(poles[np.argmin(np.where(quick, distance, distance + 2.0 * omega))])
 
     def pole_offset_rad_s(self, lag_deg: float = -90.0) -> complex:
         """Return p (1/s): the coupled pole minus i times the frequency at which the loop locks for this lag."""

@@ -1,7 +1,8 @@
 """Fit of the plant near one mode to measured frequency responses from voltage."""
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,9 @@ If the residuals of other modes explain the accelerance to within this fraction,
 equations for the pole then contain only noise or rounding. With a mode inside the band the misfit is 0.8 or more."""
 MOST_STEPS = 300
 """Of a fit that creeps along what the lines hardly determine; others take some ten."""
+STRAYED = 3.0
+"""Logarithm of the frequency over the centre, and of the damping ratio, at which a fit has left the band, or the modes."""
+LARGEST_LOGARITHM, FAR = 300.0, 1e9  # of the squared shape, kg^-1; weighted residuals beyond both
 UNDETERMINED = 1e3  # standard error over alpha, where the lines say nothing of it
 
 
@@ -52,54 +56,14 @@ def fitted(
     Raises `ValueError` if the FRFs or their covariance are not finite, differ in length, have too few lines, or show
     no resonance of the structure.
     """
-    from scipy.optimize import least_squares
-
     frequency, h_f, h_a = _checked(frequency_hz, force_per_v, acceleration_per_v)
     s: Complex = 2j * np.pi * frequency.astype(np.complex128)
     weight_f = 1.0 / np.broadcast_to(_rms(h_f) if force_std is None else np.asarray(force_std, float), h_f.shape)
     weight_a = 1.0 / np.broadcast_to(_rms(h_a) if acceleration_std is None else np.asarray(acceleration_std), h_a.shape)
     errors = _checked_covariance(covariance, frequency.size)
-    centre, start = _start(s, h_f, h_a)
-
-    def residuals(x: Float) -> Float:
-        model_f, model_a = _model(x, s, centre)
-        error = np.concatenate([(model_f - h_f) * weight_f, (model_a - h_a) * weight_a])
-        return np.concatenate([error.real, error.imag, prior(x)])
-
-    least_mass = 1e-3 * float(np.max(np.abs(start[9:])))
-
-    def prior(x: Float) -> Float:
-        if exciter_prior is None:
-            return np.zeros(0)
-        return np.asarray(x[[9, 12]] / (exciter_prior * max(abs(x[11]), least_mass)))
-
-    def jacobian_of(x: Float) -> Float:
-        of_f, of_a = _derivatives(x, s, centre)
-        error = np.concatenate([of_f * weight_f, of_a * weight_a], axis=1)
-        of_prior = np.zeros((x.size, 0))
-        if exciter_prior is not None:
-            of_prior = np.zeros((x.size, 2))
-            of_prior[[9, 12], [0, 1]] = 1.0 / (exciter_prior * max(abs(x[11]), least_mass))
-            if abs(x[11]) > least_mass:
-                of_prior[11] = -prior(x) / x[11]
-        return np.concatenate([error.real, error.imag, of_prior], axis=1).T
-
-    starts = [start] if exciter_prior is None else [start, _light(start)]
-    try:
-        fits = [
-            least_squares(
-                residuals,
-                begin,
-                jac=jacobian_of,
-                method="lm",
-                x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
-                max_nfev=MOST_STEPS,
-            )
-            for begin in starts
-        ]
-    except OverflowError:  # a mode of no or infinite damping fits best
-        raise ValueError(NO_RESONANCE) from None
-    found = min(fits, key=lambda fit: float(fit.cost))
+    centre, start = _start(s, h_f, h_a, weight_f, weight_a)
+    problem = _Problem(s, centre, h_f, h_a, weight_f, weight_a, 1e-3 * float(np.max(np.abs(start[9:]))), exciter_prior)
+    found = _best_fit(problem, [start] if exciter_prior is None else [start, _light(start)])
     x = found.x
     weights, jacobian = np.stack([weight_f, weight_a]), np.asarray(found.jac)
     frequency_std, damping_std, shape_std = np.sqrt(
@@ -122,8 +86,72 @@ def fitted(
         "acceleration_v_s2_m": tuple(map(float, x[9:13])),
         "centre_rad_s": centre,
         "band_hz": (float(frequency.min()), float(frequency.max())),
-        "fit_error": max(_rms(model_f - h_f) / _rms(h_f), _rms(model_a - h_a) / _rms(h_a)),
+        "fit_error": max(
+            _beyond_noise(model - h, None if errors is None else errors[:, row, row].real) / _rms(h)
+            for row, (model, h) in enumerate([(model_f, h_f), (model_a, h_a)])
+        ),
     }
+
+
+class _Problem(NamedTuple):
+    """Weighted residuals of both FRFs, real parts first, and of the exciter's prior."""
+
+    s: Complex
+    centre: float
+    force_per_v: Complex
+    acceleration_per_v: Complex
+    weight_f: Float
+    weight_a: Float
+    least_mass: float
+    """Least moving mass to which the prior refers, V s^2/m."""
+    exciter_prior: float | None
+
+    def residuals(self, x: Float) -> Float:
+        if max(abs(x[0]), x[1]) > STRAYED or abs(x[2]) > LARGEST_LOGARITHM:  # a step that goes there is taken back
+            return np.full(4 * self.s.size + (0 if self.exciter_prior is None else 2), FAR)
+        model_f, model_a = _model(x, self.s, self.centre)
+        of_f, of_a = (model_f - self.force_per_v) * self.weight_f, (model_a - self.acceleration_per_v) * self.weight_a
+        error = np.concatenate([of_f, of_a])
+        return np.concatenate([error.real, error.imag, self._prior(x)])
+
+    def jacobian(self, x: Float) -> Float:
+        of_f, of_a = _derivatives(x, self.s, self.centre)
+        error = np.concatenate([of_f * self.weight_f, of_a * self.weight_a], axis=1)
+        return np.concatenate([error.real, error.imag, self._derivatives_of_prior(x)], axis=1).T
+
+    def _prior(self, x: Float) -> Float:
+        if self.exciter_prior is None:
+            return np.zeros(0)
+        return np.asarray(x[[9, 12]] / (self.exciter_prior * max(abs(x[11]), self.least_mass)))
+
+    def _derivatives_of_prior(self, x: Float) -> Float:
+        if self.exciter_prior is None:
+            return np.zeros((x.size, 0))
+        out = np.zeros((x.size, 2))
+        out[[9, 12], [0, 1]] = 1.0 / (self.exciter_prior * max(abs(x[11]), self.least_mass))
+        if abs(x[11]) > self.least_mass:
+            out[11] = -self._prior(x) / x[11]
+        return out
+
+
+def _best_fit(problem: _Problem, starts: Sequence[Float]) -> Any:
+    """Return the result of `scipy.optimize.least_squares` with the least cost, from these start values."""
+    from scipy.optimize import least_squares
+
+    scale = np.maximum(np.abs(starts[0]), 1e-3 * np.max(np.abs(starts[0][5:])))
+    settings: Any = {"jac": problem.jacobian, "method": "lm", "x_scale": scale, "max_nfev": MOST_STEPS}
+    with np.errstate(all="ignore"):  # far from a plant the model may have no value
+        fits = [least_squares(problem.residuals, start, **settings) for start in starts]
+    return min(fits, key=lambda fit: float(fit.cost))
+
+
+def _beyond_noise(residuals: Complex, variance: Float | None) -> float:
+    """Root mean square of what the variance [n] of the lines does not explain; at least what n lines may show by chance."""
+    squared = float(np.mean(np.abs(residuals) ** 2))
+    if variance is not None:
+        noise = float(np.mean(variance))
+        squared = min(squared, max(squared - noise, noise / math.sqrt(residuals.size)))
+    return math.sqrt(squared)
 
 
 def _alpha_std(coefficients: Float, covariance: Float, z: float) -> float:
@@ -200,20 +228,22 @@ def _derivatives(x: Float, s: Complex, centre: float) -> tuple[Complex, Complex]
     return of_force, of_accelerance * force + accelerance * of_force
 
 
-def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Float]:
+def _start(s: Complex, h_f: Complex, h_a: Complex, weight_f: Float, weight_a: Float) -> tuple[float, Float]:
     """Return the scaling frequency (rad/s), and start values of log w, log D, log phi_d^2, residuals, alpha, beta."""
     y = h_a / h_f
-    centre = float(np.abs(s[np.argmax(np.abs(y))]))
+    centre = float(np.abs(s[np.argmin(np.abs(h_f) * weight_f / (np.abs(h_a) * weight_a))]))
     z = s / centre
     residuals = np.stack([np.ones_like(z), z**2], axis=1)
     if _rms(y - residuals @ _real_least_squares(residuals, y)) <= NO_MODE * _rms(y):
         raise ValueError(NO_RESONANCE)
-    weight = np.abs(h_f)
+    powers: Complex = z ** np.arange(5)[:, None]
+    weight: Float = weight_a / np.max(weight_a)
     for _ in range(12):
-        # (z^2 + c z + k) y = n_0 + n_2 z^2 + n_4 z^4 + damping terms: real unknowns k, c, n_0 ... n_4
-        columns = np.stack([y, z * y, *(-(z**power) for power in range(5))], axis=1) * weight[:, None]
-        k, c, *_ = _real_least_squares(columns, -(z**2) * y * weight)
-        weight = np.abs(h_f) / np.abs(z**2 + c * z + k)
+        # (z^2 + c z + k) h_a = (n_0 + n_1 z ... n_4 z^4) h_f: real unknowns k, c, n_0 ... n_4
+        terms: list[Complex] = [h_a, z * h_a, *(-powers * h_f)]
+        columns: Complex = np.stack(terms, axis=1) * weight[:, None]
+        k, c, *numerator = _real_least_squares(columns, -(z**2) * h_a * weight)
+        weight = 1.0 / np.hypot(np.abs(z**2 + c * z + k) / weight_a, np.abs(np.asarray(numerator) @ powers) / weight_f)
     spacing = float(np.median(np.diff(np.abs(z))))
     if abs(c) <= UNRESOLVED * spacing:  # narrower than the lines can tell: noise alone decides the sign
         c = max(c, NARROWEST * spacing)

@@ -10,7 +10,7 @@ only at odd lines. A random few odd lines are therefore left out.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -27,6 +27,8 @@ _GRID_KEY = 2**32 - 1
 _ROUNDING = 1e-9
 """Relative distance of a limit from a line within which it counts as on the line. Chosen: above rounding."""
 _LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte
+_LONGEST_KEPT = 2**20
+"""Samples of a period up to which the last realisations are kept. Chosen: 8 MB each, and a test asks for each several times."""
 
 
 @dataclass(frozen=True)
@@ -202,7 +204,9 @@ class MultisineDesign:
 
         Realisations of one seed are statistically independent, and none depends on how many are drawn.
         """
-        return np.asarray(self._signals(self._phases(seed, index, 1))[0])
+        if self.period_samples > _LONGEST_KEPT:
+            return np.asarray(self._signals(self._phases(seed, index, 1))[0])
+        return _kept_realisation(self, seed, index).copy()
 
     def orthogonal_realisation(self, seed: int, index: int, n_inputs: int) -> Float:
         """float[n_inputs, n_inputs, period_samples]: signals of each experiment of a block at each input, with RMS ``rms``.
@@ -237,3 +241,8 @@ class MultisineDesign:
     def crest_factor(self, seed: int, index: int) -> float:
         """Largest absolute value over RMS, so that ``realisation`` is ``unit_peak`` times ``crest_factor * rms``."""
         return float(np.max(np.abs(self.realisation(seed, index)))) / self.rms
+
+
+@lru_cache(maxsize=8)
+def _kept_realisation(design: MultisineDesign, seed: int, index: int) -> Float:
+    return np.asarray(design._signals(design._phases(seed, index, 1))[0])

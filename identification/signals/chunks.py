@@ -148,10 +148,15 @@ class Line:
     last: float
     size: int
 
+    @property
+    def step(self) -> float:
+        """Difference between two neighbouring values."""
+        return (self.last - self.first) / max(1, self.size - 1)
+
     def read(self, start: int, stop: int) -> Float:
         """float[stop - start]: values ``start`` to ``stop``."""
         values = np.arange(start, stop, dtype=np.float64)
-        values *= (self.last - self.first) / max(1, self.size - 1)
+        values *= self.step
         values += self.first
         if stop == self.size:
             values[-1] = self.last

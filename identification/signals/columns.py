@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.signals.chunks import Line, Phase, Record, spans
+from identification.signals.even_phase import EvenPhase
 from identification.signals.turns import turns_of
 from identification.validation import finite
-from vibrolock.arrays import Float
+from vibrolock.arrays import Complex, Float
 
 _MOST_KEPT = 2**22
 """Numbers that are kept in memory rather than computed again."""
@@ -40,7 +41,7 @@ class Columns:
         self._straight = Line(phase.first, phase.at(count - 1), count)
         self._position = Line(-0.5, 0.5, count)
         self._kept: list[Stretch] = []
-        self._columns: tuple[int, int, Float] | None = None
+        self._even: tuple[int, int, EvenPhase] | None = None
         self._drifts = many
         self._swing = self._ripple() if many else None
 
@@ -60,7 +61,7 @@ class Columns:
     def _read(self, start: int, stop: int) -> Stretch:
         theta = self._phase.read(start, stop)
         if self._swing is not None:
-            theta = np.asarray(theta - self._repeating(start, stop) @ self._swing)
+            theta = np.asarray(theta - self._repeating(start, stop).signal(self._swing))
         position = self._position.read(start, stop) if self._drifts else None
         design = _design(theta, self._harmonics, position)
         samples, lost = self._record.samples(start, stop)
@@ -69,34 +70,37 @@ class Columns:
             design[lost] = 0.0  # rows of zeros, in the data as well: no effect on the sums of least squares
         return Stretch(theta, design, finite("samples", samples).T, lost)
 
-    def _repeating(self, start: int, stop: int) -> Float:
-        """float[stop - start, 2 H + 1]: harmonics of a phase that advances uniformly, without a constant."""
-        if self._columns is None or self._columns[:2] != (start, stop):
-            columns = _design(self._straight.read(start, stop), self._harmonics)
-            self._columns = start, stop, columns[:, 1:-2]
-        return self._columns[2]
+    def _repeating(self, start: int, stop: int) -> EvenPhase:
+        """Harmonics of a phase that advances uniformly, in a stretch."""
+        if self._even is None or self._even[:2] != (start, stop):
+            first = float(self._straight.read(start, start + 1)[0])
+            self._even = start, stop, EvenPhase(first, self._straight.step, stop - start, self._harmonics)
+        return self._even[2]
 
-    def _ripple(self) -> Float:
-        """float[2 H + 1]: the part of the phase that repeats within every period.
+    def _ripple(self) -> Complex:
+        """complex[H + 1]: harmonics of the part of the phase that repeats within every period.
 
         It is fitted to the deviation of the phase from its moving mean over one period, so that slow variations remain.
         """
-        straight = self._straight.read(0, 2)
-        step = float(straight[1] - straight[0])
+        step = self._straight.step
         period = round(2.0 * np.pi / step)
         size = self.count - period + 1
-        right: Float | float = 0.0
+        sums: Complex | float = 0.0
         for start, stop in spans(size):
             end = stop + period - 1
             away = self._phase.read(start, end) - self._straight.read(start, end)
-            sums = np.cumsum(away)
-            mean = sums[period - 1 :] / period
-            mean[1:] -= sums[:-period] / period
+            summed = np.cumsum(away)
+            mean = summed[period - 1 :] / period
+            mean[1:] -= summed[:-period] / period
             inside = slice(period // 2, period // 2 + mean.size)
             weight = _hanning(start, stop, size)  # without it the ends of a slow variation leak into the fit
-            right = right + self._repeating(start, end)[inside].T @ ((away[inside] - mean) * weight**2)
-        middle = float(straight[0]) + step * (period // 2 + 0.5 * (size - 1))
-        return least_squares(even_products(middle, step, size, self._harmonics), np.asarray(right))
+            weighted = np.zeros(end - start)
+            weighted[inside] = (away[inside] - mean) * weight**2
+            sums = sums + self._repeating(start, end).sums(weighted)
+        middle = self._straight.first + step * (period // 2 + 0.5 * (size - 1))
+        right = np.asarray(sums)
+        found = least_squares(even_products(middle, step, size, self._harmonics), np.append(right.real[1:], right.imag))
+        return np.asarray(np.append(0.0, found[: self._harmonics]) + 1j * found[self._harmonics :])
 
 
 def even_products(middle: float, step: float, size: int, harmonics: int) -> Float:
@@ -117,9 +121,8 @@ def even_products(middle: float, step: float, size: int, harmonics: int) -> Floa
 
 def _hanning(start: int, stop: int, size: int) -> Float:
     """``np.hanning(size)[start:stop]``."""
-    return np.asarray(
-        0.5 + 0.5 * np.cos(np.pi * np.arange(1.0 - size + 2 * start, 1 - size + 2 * stop, 2) / (size - 1))
-    )
+    step = 2.0 * np.pi / (size - 1)
+    return EvenPhase((start + 0.5) * step - np.pi * size / (size - 1), step, stop - start, 1).signal(np.full(2, 0.5))
 
 
 def least_squares(normal: Float, right: Float) -> Float:

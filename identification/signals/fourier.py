@@ -128,7 +128,7 @@ def vibration_in(
     frequency_hz, periods, count, warnings = _whole_periods(phase, record.size, rate_hz, harmonics)
     chunks = Columns(record, phase, count, harmonics, many=periods >= _MIN_BATCHES)
     solution, kept = _solved(chunks)
-    squares, rough, means = _residual(chunks, solution, periods)
+    squares, rough, means, first = _residual(chunks, solution, periods)
     coefficients = np.asarray((solution[: harmonics + 1] + 1j * solution[harmonics + 1 : -2]).T)
     drift = solution[-2] + 1j * solution[-1]
     residual_rms = np.sqrt(squares / kept)
@@ -137,7 +137,7 @@ def vibration_in(
     seen_rms = np.sqrt(np.maximum(np.minimum(rough, squares) / kept - steps**2 / 12.0, 0.0))
     known_rms = _per_channel("noise_rms", noise_rms, len(channels))
     dither_rms = np.where(known_rms > 0.0, np.minimum(known_rms, residual_rms), seen_rms)
-    rounding = rounding_errors(*_shape_of(chunks, solution, coefficients), steps, dither_rms, harmonics)
+    rounding = rounding_errors(*_shape_of(chunks, first, coefficients), steps, dither_rms, harmonics)
     return PeriodicVibration(
         channels=tuple(channels),
         frequency_hz=frequency_hz,
@@ -218,21 +218,24 @@ def _solved(chunks: Columns) -> tuple[Float, int]:
     return least_squares(np.asarray(normal), np.asarray(right)), chunks.count - lost
 
 
-def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Float, Float | None]:
-    """Return sums of squares of the residual and of its white part, float[n_channels], and its coefficients batch by batch.
+def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Float, Float | None, Float]:
+    """Return sums of squares of the residual and of its white part, its coefficients batch by batch, and its first samples.
 
-    The white part is that of third differences, which higher harmonics and slow variations hardly have. The coefficients are
-    float[n_batches, 2 H + 2, n_channels]; None below four periods.
+    The sums are float[n_channels]. The white part is that of third differences, which higher harmonics and slow variations
+    hardly have. The coefficients are float[n_batches, 2 H + 2, n_channels]; None below four periods. The first samples, from
+    which the rounding is judged, are float[n, n_channels].
     """
     columns = solution.shape[0] - 2
     batches = batches_of(periods) if periods >= _MIN_BATCHES else 0
     squares, rough = np.zeros(solution.shape[1]), np.zeros(solution.shape[1])
     sums, known = np.zeros((batches, columns, solution.shape[1])), np.zeros(batches, int)
     borders: Float | None = None
+    first = np.zeros((0, solution.shape[1]))
     for chunk in chunks:
         residual = chunk.design @ solution
         np.subtract(chunk.data, residual, out=residual)
         if borders is None:
+            first = residual[:JUDGED]
             borders = chunk.theta[0] + 2.0 * np.pi * np.round(np.linspace(0, periods, batches + 1))
         edges = np.searchsorted(chunk.theta, borders)
         for batch, (start, stop) in enumerate(pairwise(edges)):
@@ -241,19 +244,18 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
                 known[batch] += stop - start - np.count_nonzero(chunk.lost[start:stop])
         thirds = np.diff(residual, 3, axis=0)
         rough += np.einsum("kc,kc->c", thirds, thirds) / _THIRD_DIFFERENCES
-        squares += np.sum(np.multiply(residual, residual, out=residual), axis=0)
+        squares += np.einsum("kc,kc->c", residual, residual)
         del chunk, residual, thirds  # before the next is read
-    return squares, rough, sums / np.maximum(known, 1)[:, None, None] if batches else None
+    return squares, rough, sums / np.maximum(known, 1)[:, None, None] if batches else None, first
 
 
-def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[Float, Complex]:
-    """Return `turns_of` some samples, and the harmonics of the vibration there: more than are asked for.
+def _shape_of(chunks: Columns, residual: Float, coefficients: Complex) -> tuple[Float, Complex]:
+    """Return `turns_of` the first samples, whose residual is given, and the harmonics there: more than are asked for.
 
     Rounding depends on the shape of a vibration to a fraction of a step, to which harmonics above H still contribute.
     """
     chunk = next(iter(chunks))
     theta = chunk.theta[:JUDGED]
-    residual = chunk.data[:JUDGED] - chunk.design[:JUDGED] @ solution
     per_period = 2.0 * np.pi * (theta.size - 1) / (theta[-1] - theta[0])
     first, last = coefficients.shape[1], min(_SHAPE_HARMONICS, int(_BELOW_HALF * per_period))
     lower = chunk.design.T[:-2, :JUDGED].reshape(2, first, theta.size)

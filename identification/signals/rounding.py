@@ -101,16 +101,15 @@ def _coefficients(turns: Float, position: Float, terms: Float) -> Complex:
     sizes = np.maximum(1.0 + np.multiply.outer(1.0 / peak, _SIZES), 0.0)
     factors = [_in_cosine(sines) for sines in terms.T]
     half_angle = _half_angle()
-    columns = turns.reshape(-1, turns.shape[2])
-    sums = np.zeros((position.shape[0] * 2 * len(_SIZES), columns.shape[0]))
+    sums = np.zeros((2, position.shape[0] * 2 * len(_SIZES), turns.shape[1]))
     for start in range(0, position.shape[1], _BLOCK):
         block = slice(start, start + _BLOCK)
-        errors = np.empty((position.shape[0], 2, len(_SIZES), columns[0, block].size))
+        errors = np.empty((position.shape[0], 2, len(_SIZES), position[0, block].size))
         for scale, where, known, out in zip(sizes, position[:, block], factors, errors, strict=True):
             mean_errors(where, scale, *half_angle, *known, out)
-        sums += errors.reshape(sums.shape[0], -1) @ columns[:, block].T
-    sums = sums.reshape(*errors.shape[:-1], -1)
-    found = (2.0 / position.shape[1]) * (sums[..., : turns.shape[1]] + 1j * sums[..., turns.shape[1] :])
+        sums += errors.reshape(sums.shape[1], -1) @ turns[:, :, block].transpose(0, 2, 1)
+    cosines, sines = sums.reshape(2, *errors.shape[:-1], -1)
+    found = (2.0 / position.shape[1]) * (cosines + 1j * sines)
     found[..., 0] *= 0.5
     return np.asarray(found)
 

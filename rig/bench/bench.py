@@ -145,6 +145,10 @@ class Bench(Configured):
     block: int = Field(1, ge=1, le=65536)
     """Samples that are exchanged with the device in one call, at most 0.2 s. A longer block is easier for the computer, but
     delays the loop, and limits act up to a block late. A block longer than ``lost_s`` trips where one block is lost."""
+    oversample: int = Field(1, ge=1, le=64)
+    """Samples of the device per sample of the loop: outputs go to the next one on a straight line, inputs pass a low-pass at
+    half of ``sample_rate_hz`` before one in ``oversample`` is kept. For a device without filters of its own, whose held output
+    would alias into the force. It delays the loop by some 13 samples, and the computer runs the loop."""
     output_range_v: float = Field(10.0, gt=0, le=100)
     """Range of the output converter, V."""
     output_resolution_v: float | None = Field(None, gt=0, le=1)
@@ -170,6 +174,17 @@ class Bench(Configured):
     def output_bit_v(self) -> float:
         """Voltage of the output converter's least bit, V."""
         return self.output_resolution_v or 2.0 * self.output_range_v / 65536.0
+
+    @property
+    def at_device(self) -> "Bench":
+        """The bench as its device sees it: with ``oversample`` samples for each of the loop's. The bench itself without any."""
+        times = self.oversample
+        if times == 1:
+            return self
+        channels = [c.model_copy(update={"skew_samples": times * c.skew_samples}) for c in self.channels]
+        rate_hz = times * self.sample_rate_hz
+        changed = {"oversample": 1, "sample_rate_hz": rate_hz, "block": times * self.block, "channels": tuple(channels)}
+        return self.model_copy(update=changed)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

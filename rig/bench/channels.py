@@ -98,6 +98,9 @@ class Channel(Configured):
     input_high_pass_hz: float = Field(0.0, ge=0, le=100)
     """Corner of the first-order high-pass of the device's input, Hz, which audio interfaces have and ``rig calibrate``
     measures; taken out as that of the sensor. 0 for none."""
+    anti_alias_hz: float | None = Field(None, ge=0, le=1e6)
+    """Corner of the analogue low-pass in front of the converter, Hz; 0 for none. Nothing is corrected by it: a bench that says
+    none of its force channel is told that images of the held output may alias onto the force."""
     sensor: str = ""
     """Make and model, for the record."""
     serial_number: str = ""

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 LONGEST_BLOCK_S = 0.2  # s; reaction time of a person at the stop button: a loop must not check less often
 OVERTRAVEL_FACTOR = 1.25
 """Multiple of a limit beyond which a ramp would take too long and the output drops to 0 V."""
+PLAIN_CONVERTERS = ("serial", "can")
+"""Drivers of boards, whose converters have no filter of their own as those of sound cards and delta-sigma modules have."""
 RANGES = {
     "force": (1e-3, 1e8),  # N: from micro force sensors to the load cells of building test floors
     "drive": (1e-2, 1e7),  # m/s^2: from seismic accelerometers to shock ones, with a decade to spare at either end
@@ -33,7 +35,7 @@ class Caution(ConfigurationError):  # noqa: N818 (said, not raised)
 
 def objections(bench: "Bench") -> tuple[ConfigurationError, ...]:
     """Return all objections to a bench, refusals first."""
-    found = [*_ranges(bench), *_block(bench), *_ramp(bench), *_drops(bench)]
+    found = [*_ranges(bench), *_block(bench), *_oversample(bench), *_images(bench), *_ramp(bench), *_drops(bench)]
     return tuple(sorted(found, key=lambda one: isinstance(one, Caution)))
 
 
@@ -78,6 +80,25 @@ def _block(bench: "Bench") -> Iterator[ConfigurationError]:
         why = f"lasts {block_s:.3g} s, and so late a limit acts; one lost block is beyond limits.lost_s and trips"
         allowed = f"1 to {most} with limits.lost_s = {bench.limits.lost_s:g}"
         yield Caution(why, field="block", value=bench.block, allowed=allowed)
+
+
+def _oversample(bench: "Bench") -> Iterator[ConfigurationError]:
+    """Check that no device is to run the loop at its own rate and at another."""
+    if bench.oversample > 1 and bench.driver.options.get("loop") == "device":
+        why = "a device that runs the loop has a sample of the loop for each of its own"
+        allowed = "1 with driver.options.loop = 'device'"
+        yield ConfigurationError(why, field="oversample", value=bench.oversample, allowed=allowed)
+
+
+def _images(bench: "Bench") -> Iterator[ConfigurationError]:
+    """Check that something keeps images of the held output out of the force, where plain converters are behind a wire."""
+    index, force = next((i, channel) for i, channel in enumerate(bench.channels) if channel.role == "force")
+    if bench.driver.name not in PLAIN_CONVERTERS or bench.oversample > 1 or force.anti_alias_hz:
+        return
+    why = "nothing is known to keep images of the held output out of the force, of which little is left at resonance"
+    allowed = "the corner of its filter in Hz, or a bench with oversample = 4"
+    said = "not given" if force.anti_alias_hz is None else force.anti_alias_hz
+    yield Caution(why, field=f"channels[{index}].anti_alias_hz", value=said, allowed=allowed)
 
 
 def _ramp(bench: "Bench") -> Iterator[ConfigurationError]:

@@ -1,6 +1,5 @@
 """The command ``rig``. It exits with status 0 only on success. Errors are one line, with a traceback under ``--debug``."""
 
-import gc
 import io
 import os
 import sys
@@ -36,6 +35,7 @@ from rig.cli.stop import stop
 from rig.cli.studies import StudyCommand, reproduce_
 from rig.cli.tune import tune_
 from rig.cli.watch import watch_
+from vibrolock.collecting import collect_rarely
 
 STOPPED = 130  # exit status after Ctrl-C: 128 and SIGINT (2), as shells have it
 
@@ -75,7 +75,7 @@ for _command in (watch_, replay_, stop):
 
 def main() -> None:
     """Run the command and exit: 0 on success, 1 on an error or unfinished run, 2 on wrong use, 130 if interrupted otherwise."""
-    gc.set_threshold(50_000)  # what is imported stays: to look through it again and again takes a tenth of a command
+    collect_rarely()
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) < len(sys.argv) - 1
     say_what_is_imported()

@@ -100,11 +100,13 @@ def _rehearse(
 ) -> None:
     from rig.errors import ConfigurationError
     from rig.figures.files import plot
+    from rig.rehearsal.loading import load
     from rig.rehearsal.report import lines, summary
     from rig.results.rehearsal.rehearse import expected_duration, improve_into, rehearse_into, request_for
     from rig.show.waiting import Waiting
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure
+    from vibrolock.in_workers import meanwhile
     from vibrolock.printable import printable
 
     if output.suffix != ".h5":
@@ -121,7 +123,7 @@ def _rehearse(
         keep_existing([], improve.with_suffix(".h5"), overwrite)
     if figure is not None:
         check_figure(figure, overwrite)
-    with Waiting("learning what is known of the rig"):
+    with Waiting("learning what is known of the rig"), meanwhile(load, jobs):
         request = request_for(subject)
     usual = expected_duration(request, jobs)
     with Rehearsing(subject.draws, usual) as listener:

@@ -13,6 +13,7 @@ from rig.cli.run_options import by_the_clock, of_a_recording, shown, with_option
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
+    from rig.rehearsal.rehearsal import RehearsalRequest
     from rig.rehearsal.report import Summary
     from rig.tuning.tuning import Tuning
 
@@ -64,13 +65,16 @@ def tune_(
     from rig.bench import load_bench
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
     from rig.errors import ConfigurationError
+    from rig.rehearsal.loading import load
     from rig.rehearsal.report import verdict_in_one_line
     from rig.show.waiting import Waiting
     from rig.text.console import print_json
     from rig.tuning.figure import check_figure, draw_tuning
     from rig.tuning.linear_test import expected_duration
     from rig.tuning.report import lines, summary
+    from rig.tuning.trials import trial_recordings
     from rig.tuning.tuning import TuningRequest, tune
+    from vibrolock.in_workers import meanwhile
     from vibrolock.printable import printable
 
     loaded = load_bench(bench)
@@ -85,9 +89,8 @@ def tune_(
     if recorded.suffix != ".h5":
         raise ConfigurationError(f"--recording {recorded}: recordings are written as .h5")
     tried, rehearsed = (output.with_name(f"{output.stem}-{what}.h5") for what in ("trial", "rehearsal"))
-    for path, wanted in ((tried, trial), (rehearsed, rehearse > 0)):
-        if wanted:
-            _check_result(path, recorded, options.overwrite)
+    for path in [*(trial_recordings(tried) if trial else []), *([rehearsed] if rehearse > 0 else [])]:
+        _check_result(path, recorded, options.overwrite)
     if figure is not None:
         check_figure(figure, options.overwrite)
     then = f"{', then a trial of the plan' if trial else ''}{', then a rehearsal' if rehearse else ''}"
@@ -98,13 +101,15 @@ def tune_(
         shown(options, MULTISINE_COLUMNS) as watched,
     ):
         found = tune(bench, recorded, request, watched, named=_as_seen_from(bench, output))
-    if trial:
-        found = _tried(found, output, tried, options, clock)
-    _write(found, output)
-    if figure is not None:
-        draw_tuning(found, figure)
+    with meanwhile(load, 1 if clock or not rehearse else -1):  # by the clock all cores are the loop's
+        if trial:
+            found = _tried(found, output, tried, options, clock)
+        _write(found, output)
+        if figure is not None:
+            draw_tuning(found, figure)
+        twins = _twins(found, rehearse) if rehearse else None
     facts = {**summary(found), "plan": str(output), "figure": None if figure is None else str(figure)}
-    foreseen = _rehearsal(found, output, rehearsed, rehearse) if rehearse else None
+    foreseen = None if twins is None else _rehearsal(twins, found, output, rehearsed)
     facts["rehearsal"] = None if foreseen is None else foreseen.model_dump(by_alias=True)
     if json:
         print_json(facts)
@@ -113,8 +118,9 @@ def tune_(
         print(printable(line))
     if foreseen is not None:
         print(f"rehearsal      {verdict_in_one_line(foreseen)}; `rig show {rehearsed}` has the page")
-    files = {"multisine recorded in": recorded, "trial in": tried if trial else None, "figure in": figure}
-    parts = [f"{what} {file}" for what, file in files.items() if file is not None]
+    trials = ", ".join(str(one.recording) for one in found.trials)
+    files = {"multisine recorded in": recorded, "trial in": trials, "figure in": figure}
+    parts = [f"{what} {file}" for what, file in files.items() if file]
     print(f"plan written to {output}, {', '.join(parts)}")
 
 
@@ -143,7 +149,7 @@ def _tried(found: "Tuning", plan: Path, recording: Path, options: "RunOptions", 
     from rig.errors import RigError
     from rig.show.waiting import Waiting
     from rig.tuning.plant import TuningError
-    from rig.tuning.tuning import try_plan
+    from rig.tuning.trials import try_plan
 
     usual = expected_duration(found.plan, found.bench, by_the_clock=by_the_clock)
     with (
@@ -159,17 +165,22 @@ def _tried(found: "Tuning", plan: Path, recording: Path, options: "RunOptions", 
             raise
 
 
-def _rehearsal(found: "Tuning", plan: Path, rehearsed: Path, draws: int) -> "Summary":
-    from rig.cli.rehearse import Rehearsing
-    from rig.rehearsal.report import summary, verdict_in_one_line
-    from rig.results.rehearsal.rehearse import Subject, expected_duration, rehearse_into, request_for
+def _twins(found: "Tuning", draws: int) -> "RehearsalRequest":
+    from rig.results.rehearsal.rehearse import Subject, request_for
     from rig.show.waiting import Waiting
 
     sources = [found.recording, *([] if found.trial is None else [found.trial.recording])]
     subject = Subject(plan=found.plan, bench=found.bench, sources=sources, draws=draws)
     with Waiting("learning what is known of the rig"):
-        request = request_for(subject)
-    with Rehearsing(draws, expected_duration(request, jobs=-1)) as listener:
+        return request_for(subject)
+
+
+def _rehearsal(request: "RehearsalRequest", found: "Tuning", plan: Path, rehearsed: Path) -> "Summary":
+    from rig.cli.rehearse import Rehearsing
+    from rig.rehearsal.report import summary, verdict_in_one_line
+    from rig.results.rehearsal.rehearse import expected_duration, rehearse_into
+
+    with Rehearsing(request.draws, expected_duration(request, jobs=-1)) as listener:
         facts = summary(
             rehearse_into(request, rehearsed, overwrite=True, until_certain=True, listener=listener, jobs=-1)
         )

@@ -16,6 +16,7 @@ from rig.conformance.timing import SLOW_TEST
 from rig.conformance.without_host import KILLING_TEST, last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
+from rig.drivers.oversampled import at_loop_rate
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqError, NotArmed
 
@@ -46,7 +47,7 @@ class _OnBench(BenchContract):
         """Those of a virtual rig of the same bench."""
         if self.bench.driver.name != "virtual":
             return None
-        with VirtualDAQ(self.bench) as known:
+        with at_loop_rate(VirtualDAQ(self.bench), self.bench) as known:
             known.start(block)
             return np.vstack([known.exchange(part.copy()) for part in outputs.reshape(-1, block)])
 

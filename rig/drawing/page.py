@@ -169,12 +169,15 @@ def _lay_out(page: Figure) -> None:
     Labels that are longer than their axes are broken into two lines, and ticks whose numbers touch are thinned out; this takes
     a second time. Raises `RecordingError` if the page has no room for the axes.
     """
+    from matplotlib.axes import Axes
+
     engine = page.get_layout_engine()
     if engine is not None and page.axes:
+        axes = page.findobj(Axes)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", COLLAPSED)
             engine.execute(page)
-            changed = _break_labels(page) | _thin_ticks(page)
+            changed = _break_labels(axes) | _thin_ticks(axes, page.dpi)
             warnings.filterwarnings("error", COLLAPSED)
             try:
                 if changed or min(min(axis.get_position().size) for axis in page.axes) <= 0.0:
@@ -187,12 +190,10 @@ def _lay_out(page: Figure) -> None:
     page.set_layout_engine(None)
 
 
-def _break_labels(page: Figure) -> bool:
+def _break_labels(axes: Sequence[Axes]) -> bool:
     """Break vertical labels that are longer than their axes into two lines; return whether there were any."""
-    from matplotlib.axes import Axes
-
     broken = False
-    for axis in page.findobj(Axes):
+    for axis in axes:
         label = axis.yaxis.label
         words = label.get_text().split()
         if len(words) < 2 or "\n" in label.get_text() or label.get_window_extent().height <= axis.bbox.height:
@@ -203,13 +204,12 @@ def _break_labels(page: Figure) -> bool:
     return broken
 
 
-def _thin_ticks(page: Figure) -> bool:
+def _thin_ticks(axes: Sequence[Axes], dpi: float) -> bool:
     """Take fewer ticks where their numbers along x touch; return whether there were any."""
-    from matplotlib.axes import Axes
     from matplotlib.ticker import MaxNLocator
 
     thinned = False
-    for axis in page.findobj(Axes):
+    for axis in axes:
         locator = axis.xaxis.get_major_locator()
         low, high = sorted(axis.get_xlim())
         shown = [
@@ -217,7 +217,7 @@ def _thin_ticks(page: Figure) -> bool:
             for label in axis.get_xticklabels()
             if label.get_text() and label.get_visible() and low <= label.get_position()[0] <= high
         ]
-        gap = 0.5 * points("xtick.labelsize") / 72.0 * page.dpi
+        gap = 0.5 * points("xtick.labelsize") / 72.0 * dpi
         if isinstance(locator, MaxNLocator) and any(b.x0 - a.x1 < gap for a, b in pairwise(shown)):
             locator.set_params(nbins=max(2, len(shown) // 2))
             thinned = True

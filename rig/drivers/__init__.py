@@ -11,6 +11,7 @@ from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, e
 
 from rig.bench import Bench
 from rig.daq import DAQ
+from rig.drivers.oversampled import at_loop_rate
 from rig.errors import ConfigurationError, RigError, as_daq_error
 
 __all__ = ["GROUP", "driver_names", "make_daq"]
@@ -62,11 +63,11 @@ def make_daq(bench: Bench, seed: int = 0) -> DAQ:
     except (ImportError, AttributeError) as error:
         raise ConfigurationError(f"its code cannot be imported: {error}", field="driver.name", value=name) from error
     try:
-        daq = driver(bench, seed)
+        daq = driver(bench.at_device, seed)
     except RigError:
         raise
     except Exception as error:
         raise as_daq_error(error) from error
     if not isinstance(daq, DAQ):
         raise ConfigurationError(f"{found[name].value} is not a rig.daq.DAQ", field="driver.name", value=name)
-    return daq
+    return at_loop_rate(daq, bench)

@@ -65,6 +65,7 @@ class VirtualPlant:
     """
 
     def __init__(self, bench: Bench, seed: int = 0, wiring: Wiring | None = None) -> None:
+        bench = bench.at_device
         if bench.driver.name != "virtual":
             raise ConfigurationError(
                 field="driver.name", value=bench.driver.name, allowed="'virtual', for what is emulated is a virtual rig"
@@ -99,6 +100,8 @@ class VirtualPlant:
         }
         self.log: OutputLog | None = None
         """Where a line is written for every block, and one of 0 V when the device is stopped."""
+        self.reset()
+        self.step(np.zeros(1))  # loads the kernels, or compiles them: no host waits for it later
         self.reset()
 
     def reset(self) -> None:

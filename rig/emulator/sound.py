@@ -166,10 +166,8 @@ def run_sound_card(
         bench = card_bench(settings.bench, float(client.samplerate))
         names = tuple(channel.name for channel in bench.channels)
         plant = VirtualPlant(bench, settings.seed, Wiring(names, settings.flip, settings.dead, settings.swap))
-        plant.step(np.zeros(client.blocksize))  # compiles
         if settings.log_output is not None:
             plant.log = OutputLog(settings.log_output)
-        plant.reset()
         card = Card(client, plant, settings.high_pass_hz, settings.cables)
         with client:
             options: Table = {

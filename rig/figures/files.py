@@ -15,7 +15,6 @@ from rig.drawing.page import check_ending, check_replaceable, page_for
 from rig.drawing.style import Figure
 from rig.errors import RecordingError
 from rig.figures.lateness import draw_lateness
-from rig.figures.overlay import overlay
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load, understood
@@ -82,7 +81,11 @@ def drawing_of(
         raise RecordingError(
             "`panels`: are those of one recording's figure, without labels, axes of one's own and lateness"
         )
-    return overlay(sources, labels, view) if curves else drawing(sources[0], lateness=lateness, panels=panels)
+    if not curves:
+        return drawing(sources[0], lateness=lateness, panels=panels)
+    from rig.figures.overlay import overlay  # which knows the curves of every kind of file
+
+    return overlay(sources, labels, view)
 
 
 def drawing(

@@ -1,5 +1,6 @@
 """Read recordings as measurements in memory, in the form that `identification` takes."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import cast
 
@@ -69,12 +70,20 @@ def force_surface(recording: Recording) -> ForceSurface:
     return surface_of(frequency_responses(recording))
 
 
-def sweeps(recording: Recording) -> dict[int, Transient]:
+def sweeps(recording: Recording, *, roles: Collection[str] | None = None) -> dict[int, Transient]:
     """Return the fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
 
     The output is channel ``voltage``.
+
+    Parameters
+    ----------
+    recording
+        Recording of a sweep.
+    roles
+        Roles of the channels that are wanted, the force's among them; all if None.
     """
-    return cast(dict[int, Transient], _measured(recording, Transient))
+    options = {} if roles is None else {"roles": roles}
+    return cast(dict[int, Transient], _measured(recording, Transient, **options))
 
 
 def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:

@@ -18,7 +18,7 @@ from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
-from rig.rehearsal.sequential import is_certain
+from rig.rehearsal.sequential import fewest_further, is_certain
 from rig.rehearsal.trial import Trial, not_computed, run_trial
 from rig.rehearsal.truth import NOT_BALANCED, TrueBackbone, true_backbone
 from rig.rehearsal.twins import Twin, draw_twin
@@ -276,20 +276,24 @@ def rehearse(
     done = {} if journal is None else _completed_draws(journal, request, begin_anew)
     for count, draw in enumerate(done.values(), 1):
         progress(draw, count)
-    missing = [number for number in range(request.draws) if number not in done]
-    results = ensemble({str(number): number for number in missing}, request, n_jobs=jobs)
     draws: list[Draw] = []
-    with closing(results):
-        for number in range(request.draws):
-            if number not in done:
-                _, draw = next(results)
-                done[number] = draw
-                if journal is not None:
-                    _append(journal, asdict(draw))
-                progress(draw, len(done))
-            draws.append(done[number])
-            if until_certain and is_certain(*_ended_well(draws)):
-                break
+    certain = False
+    while len(draws) < request.draws and not certain:
+        further = fewest_further(*_ended_well(draws)) if until_certain else request.draws
+        numbers = range(len(draws), min(len(draws) + further, request.draws))
+        results = ensemble({str(number): number for number in numbers if number not in done}, request, n_jobs=jobs)
+        with closing(results):
+            for number in numbers:
+                if number not in done:
+                    _, draw = next(results)
+                    done[number] = draw
+                    if journal is not None:
+                        _append(journal, asdict(draw))
+                    progress(draw, len(done))
+                draws.append(done[number])
+                certain = until_certain and is_certain(*_ended_well(draws))
+                if certain:
+                    break
     if not any(draw.trial.computed for draw in draws):
         raise ConfigurationError(f"none of {len(draws)} twins could be computed: {draws[0].trial.text}")
     return Rehearsal(

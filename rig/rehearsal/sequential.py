@@ -15,6 +15,7 @@ Proportions of draws that end by such a rule are biased, and their usual interva
 import math
 from collections.abc import Callable
 from functools import cache
+from itertools import count
 
 GOOD = 0.9
 """Proportion of twins on which a plan ends well above which no advice is given; chosen."""
@@ -29,6 +30,14 @@ _BOUND = math.log((1.0 - ERROR) / ERROR)
 def is_certain(well: int, of: int) -> bool:
     """Whether the test has ended after ``of`` draws, of which ``well`` ended well."""
     return abs(well * _UP + (of - well) * _DOWN) >= _BOUND
+
+
+def fewest_further(well: int, of: int) -> int:
+    """Number of further draws after which the test has ended if all of them end well; at least 1.
+
+    No more are begun at a time: those that are under way when the test ends are made for nothing.
+    """
+    return next(more for more in count(1) if is_certain(well + more, of + more))
 
 
 def unbiased(well: int, of: int) -> float:

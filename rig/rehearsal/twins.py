@@ -9,6 +9,7 @@ import numpy as np
 from rig.bench import Bench
 from rig.bench.bench import DriverChoice
 from rig.campaigns.planning.plan import Plan
+from rig.drivers.oversampled import decimation_delay
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, RigError
 from rig.rehearsal.forces import Element, damping_for, hardening_for, softening_for
@@ -284,7 +285,8 @@ class _Sample:
         if bench.driver.name == "virtual":
             kept = {k: v for k, v in bench.driver.options.items() if k in ("queue_blocks", "delay_samples")}
             return {"converter": VirtualDAQ(bench).rig.converter.model_dump(), **kept, "faults": faults}
-        rate = bench.sample_rate_hz
+        times = bench.oversample
+        rate = times * bench.sample_rate_hz
         bits = round(math.log2(2.0 * bench.output_range_v / min(c.resolution_v for c in bench.channels)))
         converter = {
             "adc_bits": bits,
@@ -294,7 +296,8 @@ class _Sample:
             "oversampling": 1,
         }
         delay = self.knowledge.loop_delay_samples
-        late = 0 if delay is None else max(0, round(delay - bench.block - 0.5))
+        own = 0.5 + decimation_delay(times)  # of hold and low-pass
+        late = 0 if delay is None else max(0, round(times * (delay - bench.block) - own))
         return {"converter": converter, "delay_samples": late, "faults": faults}
 
 

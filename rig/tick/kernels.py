@@ -243,6 +243,24 @@ def follow_harmonics(t: TickArrays, permitted: float, running: bool) -> None:
 
 
 @inner_kernel
+def with_shaped_rounding(loop: Record, output: float, largest_v: float) -> float:
+    """Return the output (V) in whole bits, with the rounding error of the one before; 0 V stays 0 V.
+
+    Error feedback of first order: the error of rounding is differentiated once, so that at a frequency f it is
+    ``2 sin(pi f / f_s)`` of what it was (Spang and Schultheiss, 1962, IRE Transactions on Communications Systems 10, 373-380).
+    """
+    if output == 0.0:
+        loop.rounding_v = 0.0
+        return 0.0
+    bit, wanted = loop.output_bit_v, output + loop.rounding_v
+    rounded = bit * math.floor(wanted / bit + 0.5)
+    if abs(rounded) > largest_v:
+        rounded = math.copysign(bit * math.floor(largest_v / bit), rounded)
+    loop.rounding_v = min(max(wanted - rounded, -bit), bit)
+    return float(rounded)
+
+
+@inner_kernel
 def oscillate(t: TickArrays, amplitude: float, command_phase_rad: float) -> float:
     """Return the output (V) of this sample, ``Re(U exp(i theta))`` and harmonics, and advance the oscillator by one sample.
 
@@ -262,6 +280,8 @@ def oscillate(t: TickArrays, amplitude: float, command_phase_rad: float) -> floa
     if not math.isfinite(output):
         shut_down(t.guard[0], EndReason.NON_FINITE_OUTPUT, -1, output, loop.sample, True)
         output = 0.0
+    elif loop.output_bit_v > 0.0 and loop.drive != Drive.WAVEFORM:
+        output = with_shaped_rounding(loop, output, t.limits[0].voltage_v)
     sent = t.history[loop.sample % t.history.size]
     sent.theta = loop.theta
     sent.omega = omega

@@ -13,7 +13,8 @@ from vibrolock.arrays import record
 LOOP = record(
     i8="sample delay_whole queue_whole force_channel drive_channel cycles held drive waveform play lost "
     "uncertain seen held_flag continued_flag played",
-    f8="delay_fraction dt_s skew_samples force_high_pass_rad_s drive_high_pass_rad_s theta theta_in force drive_motion",
+    f8="delay_fraction dt_s skew_samples force_high_pass_rad_s drive_high_pass_rad_s theta theta_in force drive_motion "
+    "output_bit_v rounding_v",
 )
 """State of the tick itself (one record): sample counter, delay from output to input, channels, oscillator phase at the
 output and at the inputs, readings of the sample, source of the frequency. ``queue_whole``: whole samples from an output to
@@ -21,7 +22,8 @@ the converter. ``skew_samples``: delay of the force channel minus that of the dr
 of their high-passes. ``held``: the level is not being ramped. ``lost``: counts up with each lost sample and down with each
 received one, never below 0. ``uncertain``: samples left in which the displacement is corrected after a loss. ``seen``:
 number of samples received. ``held_flag``, ``continued_flag``: the device's flags of a held output and of one that it
-continued; 0 if it has none. ``played``: 1 + the waveform that the last block has played; 0 for a tone."""
+continued; 0 if it has none. ``played``: 1 + the waveform that the last block has played; 0 for a tone. ``output_bit_v``: bit of
+the output converter whose rounding is fed back, 0 for none; ``rounding_v``: the error that the last output was rounded by."""
 
 HISTORY = record(f8="theta omega amplitude_v command_phase_rad output_v")
 """Outputs sent whose effect the inputs do not yet show; a ring."""

@@ -19,6 +19,7 @@ from rig.tick.safety.response_plausibility import PLAUSIBILITY, evaluate_exciter
 from rig.tick.sequencer.judgement import SETTLING
 from rig.tick.sequencer.layout import PROGRESS, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz, segment_table
+from vibrolock.arrays import undivided
 
 JUDGED_AGAIN = 11.0  # periods
 OFF = int(GuardMode.OFF)  # a member of an Enum is looked up slowly
@@ -46,6 +47,8 @@ class TickSettings:
     """Whether a start segment lasts until `Tick.release_start`, so that a caller can judge the vibration there."""
     near_limits: float = 1.0
     """Part of a limit of force or motion at which a level on its way up is given up; 1: none."""
+    output_bit_v: float = 0.0
+    """Bit of the output converter (V) whose rounding is fed back into the next output; 0: none is."""
     per_volt: tuple[float, float] | None = None
     """Force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts."""
 
@@ -98,6 +101,7 @@ class Tick:
         loop["delay_whole"] = math.floor(loop_delay_samples)
         loop["delay_fraction"] = loop_delay_samples - math.floor(loop_delay_samples)
         loop["queue_whole"] = math.floor(loop_delay_samples)
+        loop["output_bit_v"] = settings.output_bit_v
         loop["dt_s"] = 1.0 / bench.sample_rate_hz
         loop["force_channel"], loop["drive_channel"] = force, drive
         loop["skew_samples"] = bench.channels[force].skew_samples - bench.channels[drive].skew_samples
@@ -216,11 +220,10 @@ class Tick:
 
     def joined(self, readings: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Join readings and rows into one structured array, the form that is recorded."""
-        out = np.empty(rows.size, self.row_dtype)
-        out["inputs"] = readings
-        for name in ROW.names or ():
-            out[name] = rows[name]
-        return out
+        parts = undivided(readings), undivided(rows)
+        out = np.empty(rows.size, [("readings", parts[0].dtype), ("scalars", parts[1].dtype)])
+        out["readings"], out["scalars"] = parts
+        return out.view(self.row_dtype)
 
 
 def _history(size: int, omega: float, dt: float) -> np.ndarray:

@@ -6,11 +6,13 @@ amplified against the force that is controlled.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
+from rig.campaigns.evaluation.nonharmonic_force import HIGHEST_ORDER
 from vibrolock.arrays import Float
 
 
@@ -23,18 +25,41 @@ def rounding(bit: float, noise_rms: float = 0.0) -> float:
     return bit / math.sqrt(12.0) * math.exp(-2.0 * (math.pi * noise_rms / bit) ** 2)
 
 
-def bits_force_n(bench: Bench, responses: FrequencyResponseMatrix, beyond_n: float) -> float:
-    """Return the RMS of the force (N) that rounding in the output converter causes.
+class OutputBits(NamedTuple):
+    """RMS of the force that rounding in the output converter causes where lines count, N."""
 
-    Within the measured band it follows from the force per volt. Beyond the band it is at most what the multisine, which is
-    rounded alike, has shown there (``beyond_n``, N), and at most what the largest force per volt of the band would give.
+    plain_n: float
+    """As it is."""
+    shaped_n: float
+    """With its error fed back (`rig.tick.kernels.with_shaped_rounding`)."""
+
+
+def output_bits(bench: Bench, responses: FrequencyResponseMatrix, beyond_n: float) -> OutputBits:
+    """Return the force that rounding in the output converter causes.
+
+    Within the measured band it follows from the force per volt. Beyond the band, up to `HIGHEST_ORDER` times the mode's
+    frequency where the error is fed back, it is at most what the multisine, which is rounded alike, has shown there
+    (``beyond_n``, N), and at most what the largest force per volt of the band would give.
     """
     frequency, size = responses.frequency_hz, np.abs(responses.value[:, 0, 0])
     error, half_rate = rounding(bench.output_bit_v), 0.5 * bench.sample_rate_hz
-    inside = error * math.sqrt(float(np.trapezoid(size**2, frequency)) / half_rate)
-    width = max(half_rate - float(frequency[-1] - frequency[0]), 0.0)
-    outside = error * float(size.max()) * math.sqrt(width / half_rate)
-    return math.hypot(inside, min(outside, beyond_n))
+    highest = min(HIGHEST_ORDER * bench.specimen.linear_frequency_hz, half_rate)
+
+    def shaping(at_hz: Float) -> Float:
+        return 2.0 * np.sin(0.5 * np.pi * at_hz / half_rate)
+
+    def outside_n(width_hz: float) -> float:
+        return error * float(size.max()) * math.sqrt(max(width_hz, 0.0) / half_rate)
+
+    def inside_n(shape: Float) -> float:
+        return error * math.sqrt(float(np.trapezoid((shape * size) ** 2, frequency)) / half_rate)
+
+    first, last = float(frequency[0]), float(frequency[-1])
+    plain_n = math.hypot(inside_n(np.ones(size.size)), min(outside_n(half_rate - (last - first)), beyond_n))
+    above = shaping(np.linspace(last, max(highest, last), 100))
+    part = math.sqrt(max(highest - last, 0.0) / (half_rate - last)) if half_rate > last else 0.0
+    beyond_shaped_n = math.sqrt(float(np.mean(above**2))) * min(outside_n(highest - last), part * beyond_n)
+    return OutputBits(plain_n, math.hypot(inside_n(shaping(frequency)), beyond_shaped_n))
 
 
 def periodic_beyond(values: Float, period_samples: int, highest_line: float) -> float:

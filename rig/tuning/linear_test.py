@@ -21,7 +21,7 @@ from rig.measurements import point_rows, spectra
 from rig.recording.reader import Recording
 from rig.text.durations import duration
 from rig.tick.safety.layout import EndReason
-from rig.tuning.converter_bits import bits_force_n, periodic_beyond
+from rig.tuning.converter_bits import OutputBits, output_bits, periodic_beyond
 from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
 BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could excite lie inside
@@ -43,6 +43,7 @@ LIMITS = tuple(
     reason.name.lower() for reason in (EndReason.FORCE_LIMIT, EndReason.RESPONSE_LIMIT, EndReason.DISPLACEMENT_LIMIT)
 )
 """Ends of a run at a limit of force or motion."""
+STUCK = EndReason.SENSOR_STUCK.name.lower()
 SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)  # see `LevelSearch`; chosen
 
 
@@ -64,8 +65,8 @@ class LinearTest:
     """One-sided noise density of the force near the mode, N^2/Hz."""
     acceleration_density: float
     """One-sided noise density of the drive acceleration near the mode, (m/s^2)^2/Hz."""
-    bits_force_n: float
-    """RMS of the force that the last bits of the output converter cause, at frequencies other than the output's, N."""
+    bits: OutputBits
+    """Force that the last bits of the output converter cause, at frequencies other than the output's."""
     levels_tried_v: tuple[float, ...]
     """All levels that were played in the search, V RMS."""
     share_of_limits: float
@@ -123,7 +124,7 @@ def measure(
         distortion=float(np.median(np.sqrt(nonlinear) / np.abs(matrix.value[around, 0, 0]))),
         force_density=noise[0],
         acceleration_density=noise[1],
-        bits_force_n=bits_force_n(bench, matrix, runs.force_beyond_n),
+        bits=output_bits(bench, matrix, runs.force_beyond_n),
         levels_tried_v=tried,
         share_of_limits=runs.share_of_limits,
         tripped=runs.tripped,
@@ -167,6 +168,14 @@ class _LimitError(TuningError):
     """A multisine has tripped at a limit of force or motion."""
 
 
+class SilentError(TuningError):
+    """A multisine has tripped because a channel read nothing."""
+
+
+class _UnsteadyError(TuningError):
+    """The first period of a multisine differs from the others."""
+
+
 class _Runs:
     """The multisines of a tuning, and the measurements of the last one."""
 
@@ -180,11 +189,14 @@ class _Runs:
     """RMS of the periodic force above the excited band, N: distortion, and what the output's last bits cause there."""
     coherence: tuple[float, float]
     """Coherence of force and drive at the last coarse level."""
-    share_of_limits: float
-    """Largest peak relative to its limit there."""
+    share_of_limits = math.nan
+    """Largest peak relative to its limit there; NaN before a level was evaluated."""
 
     tripped = ""
     """How a level of the search has tripped; empty if none has."""
+
+    raised = False
+    """Whether a level of the search was raised because too little was read at it."""
 
     def __init__(self, series: MultisineSeries, bench_name: str, highest_hz: float | None) -> None:
         self.series, self.bench, self.name = series, series.bench, bench_name
@@ -205,7 +217,7 @@ class _Runs:
             transient_periods=TRANSIENT_PERIODS,
             periods=PERIODS,
         )
-        with self.series.play(plan) as recording:
+        with self.series.play(plan, after_silence=self.raised) as recording:
             _ended_well(recording, level_rms_v)
             self.lead_samples = float(recording.parts[-1].information["about"]["lead_samples"])
             self.measured = spectra(recording)[level_rms_v]
@@ -219,9 +231,18 @@ class _Runs:
         return self.measured
 
     def search_at(self, level_rms_v: float) -> Seen:
-        """Play a level of the search; one that trips at a limit of force or motion is lowered once, to a quarter."""
+        """Play a level of the search; one that trips at a limit of force or motion is lowered once, to a quarter.
+
+        The first one, at which a channel reads nothing, or whose periods differ as those of a few bits do, is raised as far,
+        once: the sensor may be dead. Later ones are not, for they may be near a limit.
+        """
         try:
             return self.listen(level_rms_v)
+        except (SilentError, _UnsteadyError):
+            if self.raised or self.tripped or not math.isnan(self.share_of_limits):
+                raise
+            self.raised = True
+            return Seen(False, SEARCH.safe_share * AFTER_TRIP, 1.0 / AFTER_TRIP)
         except _LimitError as error:
             if self.tripped:
                 raise
@@ -247,13 +268,14 @@ def _ended_well(recording: Recording, level: float) -> None:
     end = recording.parts[-1].end
     text = "" if end is None else end["text"]
     if end is None or end["reason"] != "completed":
-        at_limit = end is not None and end["reason"] in LIMITS
-        raise (_LimitError if at_limit else TuningError)(
-            f"multisine at {level:.4g} V RMS: {text}; recorded in {recording.path}"
-        )
-    failed = [point for point in points_of(recording) if not point.accepted]
+        reason = None if end is None else end["reason"]
+        error = _LimitError if reason in LIMITS else SilentError if reason == STUCK else TuningError
+        raise error(f"multisine at {level:.4g} V RMS: {text}; recorded in {recording.path}")
+    last = len(recording.parts) - 1
+    failed = [point for point in points_of(recording) if not point.accepted and point.part == last]
     if failed:
-        raise TuningError(f"multisine at {level:.4g} V RMS: {failed[0].reason}; recorded in {recording.path}")
+        error = _UnsteadyError if failed[0].settled is False else TuningError
+        raise error(f"multisine at {level:.4g} V RMS: {failed[0].reason}; recorded in {recording.path}")
 
 
 def _audible(bench: Bench, level: float, seen: tuple[float, float], when: str) -> None:

@@ -36,45 +36,75 @@ def plan_text(
     recording: Path,
 ) -> str:
     """Return a backbone plan as TOML."""
-    hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
-    volts = chosen.law == "phase"
-    settling = chosen.design.settling.longest
-    time_out = max(MIN_TIMEOUT_PERIODS, 100.0 * math.ceil(0.05 * settling) if math.isfinite(settling) else 0.0)
-    head = [
+    volts, settling = chosen.law == "phase", chosen.design.settling.longest
+    lines = [
+        *_summary(plant, chosen),
+        *_levels(bench_name, bench, levels, volts),
+        *([] if volts else _start(plant, chosen, start)),
+        *_ramps(plant, chosen),
+        *_rounding(levels),
+        *_controller(plant, chosen, window),
+        *([] if harmonics is None else _harmonics(harmonics)),
+        *(_settle(settling, levels) if math.isfinite(settling) else []),
+        *_measured_plant(plant, measured, recording),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _levels(bench_name: str, bench: Bench, levels: LevelChoice, volts: bool) -> list[str]:
+    needed = f"the linear plant needs {levels.needed_v[0]:.3g} to {levels.needed_v[-1]:.3g} V, a nonlinear one may need more."
+    return [
         _line("kind", "backbone"),
         _line("description", f"backbone of the {bench.specimen.name}, tuned by rig tune"),
         _line("bench", bench_name),
-        *_comment(
-            f"{levels.why[0].upper()}{levels.why[1:]}; the linear plant needs {levels.needed_v[0]:.3g} to "
-            f"{levels.needed_v[-1]:.3g} V, a nonlinear one may need more."
-        ),
+        *_comment(f"{levels.why[0].upper()}{levels.why[1:]}; {needed}"),
         _line("levels_v", [significant(v) for v in levels.needed_v])
         if volts
         else _line("levels_m", list(levels.levels_m)),
     ]
-    lost_periods = max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))
-    ramp = ramp_periods(plant, chosen.tracking_periods)
-    if not volts:
-        head += [
-            "# Voltage of the lowest level on the linear plant (before a trial), or less: the way there takes more force.",
-            _line("start_v", significant(start.voltage_v, 4)),
-            _line("start_ramp_periods", start.ramp_periods),
-            "# Until vibration and frequency have come to rest there.",
-            _line("start_periods", start_periods(plant, chosen.tracking_periods)),
-        ]
-    head += [
+
+
+def _start(plant: PlantModel, chosen: Chosen, start: Start) -> list[str]:
+    return [
+        "# Voltage of the lowest level on the linear plant (before a trial), or less: the way there takes more force.",
+        _line("start_v", significant(start.voltage_v, 4)),
+        _line("start_ramp_periods", start.ramp_periods),
+        "# Until vibration and frequency have come to rest there.",
+        _line("start_periods", start_periods(plant, chosen.tracking_periods)),
+    ]
+
+
+def _ramps(plant: PlantModel, chosen: Chosen) -> list[str]:
+    return [
         "# Slow enough that force and frequency follow with the damping as measured.",
-        _line("ramp_periods", ramp),
-        "# A level that loses the lock, or comes near a limit, is left out, and those above it.",
+        _line("ramp_periods", ramp_periods(plant, chosen.tracking_periods)),
+        "# A level that loses the lock, or comes near a limit, is left out, and those above it; one that loses it is tried",
+        "# once more, by a slower ramp.",
         _line("on_lost_lock", "skip"),
+        _line("lost_lock_attempts", 2),
         _line("near_limits", NEAR_LIMITS),
     ]
+
+
+def _rounding(levels: LevelChoice) -> list[str]:
+    out = []
     if levels.accepted_nonharmonic is not None:
-        head += [
+        out += [
             "# Rounding of the output: lines away from the harmonics, which do not change frequency and damping.",
             _line("accepted_nonharmonic_force", significant(levels.accepted_nonharmonic, 2)),
         ]
-    controller = [
+    if levels.noise_shaping:
+        out += [
+            "# Errors of rounding are fed back, away from the frequency of the test.",
+            _line("noise_shaping", True),
+        ]
+    return out
+
+
+def _controller(plant: PlantModel, chosen: Chosen, window: Window) -> list[str]:
+    hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
+    lost_periods = max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))
+    return [
         "",
         "[controller]",
         *_comment(f"{chosen.why}."),
@@ -85,33 +115,38 @@ def plan_text(
         *_gains(chosen),
         "# In a ramp the frequency changes with the level as from point to point before.",
         _line("frequency_feed_forward", True),
-        *([] if volts else _slopes(chosen)),
+        *([] if chosen.law == "phase" else _slopes(chosen)),
         *_comment(f"Resonance of the structure alone as measured; {window.why}."),
         _line("centre_frequency_hz", significant(hertz, 6)),
         _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),
         "# A lock counts as lost if it has not returned within twice the time in which the frequency follows.",
         f"lock = {{ lost_periods = {lost_periods}, waiting_deg = {WAITING_DEG:g} }}",
     ]
-    controller += [] if harmonics is None else _harmonics(harmonics)
-    settle = [
+
+
+def _settle(settling: float, levels: LevelChoice) -> list[str]:
+    return [
         "",
         "[settle]",
         f"# Predicted for a step of 30 % in level or of half a bandwidth in frequency: {settling:.0f} periods.",
-        _line("longest_periods", time_out),
+        _line("longest_periods", max(MIN_TIMEOUT_PERIODS, 100.0 * math.ceil(0.05 * settling))),
         *([] if levels.accepted_nonharmonic is None else [_line("average_periods", AVERAGED_BITS)]),
     ]
-    facts = [
+
+
+def _measured_plant(plant: PlantModel, measured: ChannelRatios, recording: Path) -> list[str]:
+    out = [
         "",
         f"# The plant as measured ({recording.name}): gains and levels are checked against it before anything moves.",
+        "[plant]",
+        *(_line(key, value) for key, value in plant.to_dict().items()),
     ]
-    facts += ["[plant]", *(_line(key, value) for key, value in plant.to_dict().items())]
     if measured.ratios:
-        facts.append("# Motion of the response channels for that of the drive point, and standard errors.")
+        out.append("# Motion of the response channels for that of the drive point, and standard errors.")
         for key, values in zip(("response_ratios", "response_ratio_stds", "response_turns_deg"), measured, strict=True):
             listed = ", ".join(f"{name} = {significant(value)}" for name, value in values.items())
-            facts += [f"{key} = {{ {listed} }}"] if values else []
-    settle = settle if math.isfinite(settling) else []
-    return "\n".join([*_summary(plant, chosen), *head, *controller, *settle, *facts]) + "\n"
+            out += [f"{key} = {{ {listed} }}"] if values else []
+    return out
 
 
 def _slopes(chosen: Chosen) -> list[str]:

@@ -32,6 +32,7 @@ FINE_FIT = (
 )
 MODEL_ERROR = 0.02
 """Of a response: error of the model that weighs in the fit beside the noise, so that small responses count."""
+NEIGHBOURS = 10  # lines; chosen: the noise of a band around a mode changes little over twenty
 UNKNOWN_STD = 1e3  # times alpha: its standard error where the lines do not tell it
 EXCITER_PRIOR = 0.3  # an exciter's spring in the band, relative to its moving mass, where one mode does not show it
 
@@ -138,8 +139,8 @@ def _fitted(
     around = near(bench, frequency, band)
     covariance = responses.total_covariance if responses.total_covariance is not None else responses.noise_covariance
     value = responses.value[around, :2, 0]
-    noise = np.nan_to_num(responses.total_std[around, :2, 0], nan=0.0, posinf=0.0)
-    std = np.hypot(noise, MODEL_ERROR * np.abs(value))
+    total, noise = responses.total_std[around, :2, 0], responses.noise_std[around, :2, 0]
+    std = np.hypot(smoothed_std(np.where(np.isfinite(total), total, noise)), MODEL_ERROR * np.abs(value))
     return PlantModel.from_frequency_responses(
         frequency[around],
         value[:, 0],
@@ -151,6 +152,15 @@ def _fitted(
         covariance=None if covariance is None else covariance[around, :2, :2],
         exciter_prior=EXCITER_PRIOR,
     )
+
+
+def smoothed_std(std: Float) -> Float:
+    """Standard deviations [n, 2] pooled over `NEIGHBOURS` on either side: a line's own, of few periods, may be near zero."""
+    if not std.size:
+        return std
+    variance = np.pad(np.nan_to_num(std, posinf=0.0) ** 2, ((NEIGHBOURS, NEIGHBOURS), (0, 0)), mode="reflect")
+    windows = np.lib.stride_tricks.sliding_window_view(variance, 2 * NEIGHBOURS + 1, axis=0)
+    return np.asarray(np.sqrt(windows.mean(axis=-1)))
 
 
 class ChannelRatios(NamedTuple):

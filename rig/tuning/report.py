@@ -8,6 +8,7 @@ from rig.text.json_values import JsonValue
 from rig.tuning.design import gains_of
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.plant import mass_ratios
+from rig.tuning.trial import PlanTrial
 from rig.tuning.tuning import Tuning
 
 SHOWN_SHIFT = 0.05  # shift of the frequency for which the slope of a cubic spring is given; chosen
@@ -67,14 +68,12 @@ def summary(tuning: Tuning) -> dict[str, JsonValue]:
         "needed_v": list(tuning.levels.needed_v),
         "levels_why": tuning.levels.why,
         "harmonics": _harmonics(tuning.harmonics),
-        "trial": _trial(tuning),
+        "trials": [_trial(trial) for trial in tuning.trials],
         "notes": list(tuning.notes),
     }
 
 
-def _trial(tuning: Tuning) -> dict[str, JsonValue] | None:
-    if (trial := tuning.trial) is None:
-        return None
+def _trial(trial: PlanTrial) -> dict[str, JsonValue]:
     return {
         "recording": str(trial.recording),
         "accepted": trial.accepted,
@@ -149,18 +148,22 @@ def lines(tuning: Tuning) -> list[str]:
         f"levels         {1e3 * levels_m[0]:.3g} to {1e3 * levels_m[-1]:.3g} mm in {len(levels_m)} steps, {needed_v[0]:.3g} to "
         f"{needed_v[-1]:.3g} V on the linear plant; {tuning.levels.why}"
     )
-    if tuning.trial is not None:
-        held, missing = tuning.trial.held, tuning.trial.missing
-        kept = "all levels were held" if not missing else f"levels {held[0] + 1} to {held[-1] + 1} were held; {missing}"
-        if not missing and tuning.trial.recording.name in tuning.levels.why:
-            kept += ", the lowest is raised for rounding"
-        out.append(f"trial          {kept}{'; it tripped' if tuning.trial.tripped else ''}")
+    out += [
+        f"{'trial' if number == 0 else 'tried again':14} {_held(trial)}" for number, trial in enumerate(tuning.trials)
+    ]
     if tuning.harmonics is not None:
         settings, found = tuning.harmonics.settings, tuning.harmonics.sensitivity_peaks
         peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in found.items()) or "unknown"
         out.append(f"harmonics      2 to {settings.highest}, integral = {settings.integral:g}, max |S| {peaks}")
         out += [f"  {reason}" for reason in tuning.harmonics.reasons]
     return [*out, *(f"note: {note}" for note in tuning.notes)]
+
+
+def _held(trial: PlanTrial) -> str:
+    """What a trial has held, in a line."""
+    held, missing = trial.held, trial.missing
+    kept = "all levels were held" if not missing else f"levels {held[0] + 1} to {held[-1] + 1} were held; {missing}"
+    return f"{kept}{'; it tripped' if trial.tripped else ''}"
 
 
 def _design_lines(design: Design) -> list[str]:

@@ -32,9 +32,12 @@ IN_ORDER = (
 MIN_HELD_SPAN = 1.15  # highest level over lowest that a trial has to hold, if more was planned; chosen
 AS_ROUNDING = (Quality.REJECTED, Quality.NOT_SETTLED, Quality.DISTURBED)
 """Qualities of levels that rounding may spoil. Others are no better further up: a lock that is lost, a limit that is near."""
+TOO_LARGE = (Quality.LOST_LOCK, Quality.TOO_STEEP, Quality.NEAR_LIMIT)
+"""Qualities of levels at which a structure may be too nonlinear."""
+LOWERED = 2.0  # highest level over lowest, where levels are lowered; chosen
 DRIFT_WITHIN = 0.6  # of what the plan accepts; chosen: where rounding moves the force, the next record drifts otherwise
 SETTLED_WITHIN = 0.5  # of the longest time allowed for it: a level that takes longer may not settle next time; chosen
-NONHARMONIC_WITHIN = 0.8  # of what the plan accepts, at the lowest level; chosen: repeated levels differed by a tenth
+NONHARMONIC_WITHIN = 0.5  # of what the plan accepts; chosen: repeated levels differed by a half
 
 
 class TrialEndedError(TuningError):
@@ -78,6 +81,8 @@ class PlanTrial:
         """What of an accepted point may spoil it next time; empty if nothing."""
         if (periods := point.settle_periods or 0.0) > SETTLED_WITHIN * self.longest_settling:
             return f"took {periods:.0f} periods to settle"
+        if (found := point.nonharmonic_force or 0.0) > NONHARMONIC_WITHIN * self.accepted_nonharmonic:
+            return f"{100.0 * found:.2g} % of the force's RMS was not harmonic"
         spectrum = None if point.vibration is None else point.vibration.spectrum
         if spectrum is None or spectrum.drift is None:
             return ""
@@ -109,11 +114,24 @@ class PlanTrial:
         held, levels = self.held, planned.levels_m
         return levels[held[-1]] / levels[held[0]] if len(held) >= min(2, len(levels)) else 0.0
 
+    def lower_levels(self, planned: LevelChoice) -> LevelChoice | None:
+        """Return levels below those planned, where too few of the lowest were held, and those above were too large.
+
+        A structure may be nonlinear from the lowest level on that is free of rounding by the estimate.
+        """
+        held, missing = self.held, self._first_missing()
+        if self.held_span(planned) >= self._needed_span(planned) or self.tripped or missing is None:
+            return None
+        if missing.number != len(held) or missing.quality not in TOO_LARGE:
+            return None
+        highest = planned.levels_m[held[-1] if held else 0]
+        why = f"those planned were too large in a trial ({self.missing}; {self.recording.name})"
+        return planned.within(highest / LOWERED, highest, why)
+
     def levels(self, planned: LevelChoice) -> LevelChoice:
         """Return the levels of the plan within the range that was held; the planned ones if all were.
 
-        The lowest level is raised where the force away from its harmonics, whose rounding does not depend on the level, is
-        more than `NONHARMONIC_WITHIN` of what the plan accepts. Raises `TuningError` if no range was held.
+        Raises `TuningError` if no range was held.
         """
         held, levels, needed = self.held, planned.levels_m, self._needed_span(planned)
         if self.held_span(planned) < needed:
@@ -122,18 +140,12 @@ class PlanTrial:
                 f"between the lowest and the highest: {self.missing or self.end}; recorded in {self.recording}"
             )
         lowest, highest = levels[held[0]], levels[held[-1]]
-        raised = self._nonharmonic(held) / (NONHARMONIC_WITHIN * self.accepted_nonharmonic)
-        lowest = max(lowest, min(raised * lowest, highest / needed))
         if (lowest, highest) == (levels[0], levels[-1]):
             return planned
         return planned.within(lowest, highest, f"the range that a trial of the plan held ({self.recording.name})")
 
     def _needed_span(self, planned: LevelChoice) -> float:
         return min(MIN_HELD_SPAN, planned.span)
-
-    def _nonharmonic(self, held: Sequence[int]) -> float:
-        found = next(point.nonharmonic_force for point in self.points if point.number == held[0])
-        return found if found is not None and found > 0.0 else 0.0
 
 
 def carried_out(plan: BackbonePlan, bench: Bench, recording: Path, options: RunOptions) -> PlanTrial:
@@ -142,7 +154,8 @@ def carried_out(plan: BackbonePlan, bench: Bench, recording: Path, options: RunO
     Raises `TrialEndedError` if the run ended for another reason than a level out of reach.
     """
     options = replace(options, about=replace(options.about, purpose=PURPOSE))
-    with run_plan(plan, bench, recording, options) as recorded:
+    once = plan.model_copy(update={"lost_lock_attempts": 1})  # a level that needs a second attempt is not held
+    with run_plan(once, bench, recording, options) as recorded:
         end, points = recorded.parts[-1].end, points_of(recorded)
     if end is None or end["reason"] not in IN_ORDER:
         text = "" if end is None else end["text"]

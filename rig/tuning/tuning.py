@@ -20,7 +20,6 @@ from rig.tuning.levels import (
     LARGER_FRACTION,
     LIMIT_FRACTION,
     NARROW_SPAN,
-    NARROWEST_SPAN,
     SPAN,
     LevelChoice,
     LowestForce,
@@ -30,11 +29,12 @@ from rig.tuning.levels import (
     needed_n,
     reach_m,
 )
-from rig.tuning.linear_test import MAX_DISTORTION, LinearTest, measure
+from rig.tuning.linear_test import MAX_DISTORTION, LinearTest, SilentError, measure
 from rig.tuning.plan import plan_text
 from rig.tuning.plant import ChannelRatios, UnsuitedError, channel_ratios, compared_with_bench, plant_of
 from rig.tuning.shifts import Start, Window, frequency_window, start_of
-from rig.tuning.trial import PlanTrial, carried_out
+from rig.tuning.trial import PlanTrial
+from vibrolock.one_thread import one_thread
 from vibrolock.results import Result
 
 PURPOSE = "tuning"  # purpose of the recording of a tuning, in the facts of its parts
@@ -122,8 +122,13 @@ class Tuning(Result):
     """Frequencies that the loop of the plan may take."""
     bench_name: str
     """Name of the bench in the plan."""
-    trial: PlanTrial | None = None
-    """Trial of the plan, if it was carried out (`try_plan`)."""
+    trials: tuple[PlanTrial, ...] = ()
+    """Trials of the plan, if it was carried out (`try_plan`); each but the first of the levels that the one before has held."""
+
+    @property
+    def trial(self) -> PlanTrial | None:
+        """The last trial, if there was one."""
+        return self.trials[-1] if self.trials else None
 
     @property
     def plan_toml(self) -> str:
@@ -152,6 +157,7 @@ class Tuning(Result):
         return read
 
 
+@one_thread()
 def tune(
     bench: Bench | str | Path,
     recording: str | Path,
@@ -204,34 +210,6 @@ def tune(
     )
 
 
-def try_plan(tuning: Tuning, recording: str | Path, options: RunOptions | None = None) -> Tuning:
-    """Carry out the plan of a tuning once, recorded in ``recording``, and return the tuning with the levels that were held.
-
-    The plan keeps the longest row of levels that were accepted with something to spare (`PlanTrial.held`), in as many steps. Of
-    what lies above them, as a backbone that becomes too steep, or below, as rounding, a linear test tells little. Where levels
-    span little and rounding disturbs some of them, larger ones are tried once.
-
-    Raises `rig.tuning.plant.TuningError` if no range of levels was held, `rig.tuning.trial.TrialEndedError` if the run ended
-    for another reason, and the errors of `rig.run`.
-    """
-    options, path = options or RunOptions(), Path(recording)
-    found = carried_out(tuning.plan, tuning.bench, path, options)
-    if tuning.larger is not None and found.is_disturbed and tuning.levels.span < NARROWEST_SPAN:
-        note = f"up to a third of the limits rounding disturbs the levels ({found.missing}); these are larger"
-        larger = replace(tuning, levels=tuning.larger, larger=None, notes=(*tuning.notes, note))
-        beside = path.with_name(f"{path.stem}-larger{path.suffix}")
-        again = carried_out(larger.plan, tuning.bench, beside, options)
-        if again.held_span(larger.levels) > found.held_span(tuning.levels):
-            tuning, found = larger, replace(again, recording=beside.replace(path))
-        else:
-            beside.unlink()
-    levels = found.levels(tuning.levels)
-    if levels is tuning.levels:
-        return replace(tuning, trial=found)
-    notes = tuple(note for note in tuning.notes if note not in tuning.level_notes)
-    return replace(tuning, levels=levels, notes=notes, trial=found)
-
-
 class _Designed(NamedTuple):
     """A plant as measured at one level, and the gains for it."""
 
@@ -265,10 +243,9 @@ def _designed(bench: Bench, request: TuningRequest, name: str, series: Multisine
     except UnsuitedError as refusal:
         others = test.other_levels_v if request.level_rms_v is None else ()
         for level in others:
-            again = measured(level)
             try:
-                found = _gains(bench, request, again)
-            except UnsuitedError:
+                found = _gains(bench, request, measured(level))
+            except (UnsuitedError, SilentError):
                 continue
             note = (
                 f"no gains suit the plant as the multisine at {test.level_rms_v:.3g} V RMS shows it; those of this plan are "
@@ -288,7 +265,7 @@ def _gains(bench: Bench, request: TuningRequest, test: LinearTest) -> _Designed:
     notes = (*compared_with_bench(bench, plant), *_turned(measured.turns_deg))
     ratios = bench.response_ratios | measured.ratios
     highest_m = LIMIT_FRACTION * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
-    lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
+    lowest = lowest_force(bench, plant, highest_m, test.bits)
     densities = (test.force_density, test.acceleration_density)
     largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n, needed_n(plant, highest_m))
     chosen = choose(plant, test.responses, request.law, largest, noise)
@@ -306,7 +283,7 @@ def _levels(found: _Designed, bench: Bench, request: TuningRequest) -> tuple[Lev
     if request.from_m is not None or request.to_m is not None or not found.lowest.bound:
         return wanted, None
     highest_m = LARGER_FRACTION * reach_m(bench, plant, ratios)[0]
-    bounded = lowest_force(bench, plant, highest_m, found.test.bits_force_n)
+    bounded = lowest_force(bench, plant, highest_m, found.test.bits)
     lowest = replace(bounded, force_n=max(bounded.force_n, found.lowest.force_n))
     return wanted, choice(lowest=lowest, highest_m=highest_m)
 

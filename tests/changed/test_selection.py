@@ -88,6 +88,7 @@ def folders(modules):
     return {module.split(".")[1] for module in modules}
 
 
+@pytest.mark.slow
 def test_a_change_of_the_detector_leaves_modal_analysis_and_structures_out(project):
     kept = selected(["controller/detector.py"], *project).kept
     assert {"tests.controller.test_pll", "tests.rig.tick.test_tick", "tests.docs.test_pages"} <= kept

@@ -42,6 +42,7 @@ def with_queue(bench: Bench, blocks: int) -> Bench:
     return bench.model_copy(update={"driver": bench.driver.model_copy(update={"options": options})})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", BLOCKS)
 def test_neighbours_in_each_others_place_leave_the_point_as_it_is(monkeypatch, rate):
     bench = bench_at(rate).model_copy(update={"block": BLOCKS[rate]})

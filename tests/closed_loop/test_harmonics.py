@@ -107,6 +107,7 @@ def test_it_takes_at_most_half_as_many_periods_again_as_without_the_loop(backbon
             assert worst(true_points(run.recording, 3)) > 1.5
 
 
+@pytest.mark.slow
 def test_the_force_is_a_sine_on_both_branches_and_the_points_lie_on_the_curve():
     lags = [-150.0, -120.0, -100.0, -90.0, -80.0, -60.0, -40.0, -30.0]
     plan = changed(
@@ -129,6 +130,7 @@ def test_the_force_is_a_sine_on_both_branches_and_the_points_lie_on_the_curve():
     assert not truth.stable[lags.index(-60.0)]
 
 
+@pytest.mark.slow
 def test_prescribed_harmonics_are_those_of_the_true_force():
     plan = load_plan("magnet-beam/harmonics-varied")
     plan = plan.model_copy(update={"levels_v": (plan.levels_v[0], plan.levels_v[-1])})
@@ -199,6 +201,7 @@ def test_the_drive_point_moves_in_a_sine_where_its_acceleration_is_controlled():
     assert np.abs(true.ratios()).max() > 1.0  # for which the force needs harmonics
 
 
+@pytest.mark.slow
 def test_short_points_have_a_sine_at_the_end_of_their_approach_if_not_on_the_way():
     plan = changed("magnet-beam/backbone-pure", evaluation="slow-flow")
     with rig.run(plan, seed=1) as run:

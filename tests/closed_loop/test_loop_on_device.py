@@ -52,6 +52,7 @@ def require_the_virtual_run(plan, seed, output, tolerance, wire="serial"):
         assert counted <= {"retries", "stray_answers"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wire", ["serial", "can"])
 def test_a_backbone_on_the_device_is_that_of_the_virtual_rig(wire, tmp_path):
     plan = changed("magnet-beam/backbone", levels_v=[0.4], record_periods=8)

@@ -33,6 +33,7 @@ def require_on_the_computer(recording, because):
     assert "loop" not in about["device"]
 
 
+@pytest.mark.slow
 def test_a_plan_that_does_not_fit_is_refused_with_the_sum_or_run_by_the_computer(tmp_path):
     output = tmp_path / "run.h5"
     with reaching("device", room=ROOM) as bench, refused(DaqRefused, "takes-more-than-there-is-room"):

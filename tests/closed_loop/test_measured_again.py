@@ -189,7 +189,7 @@ def test_a_stopped_run_with_repeated_points_is_resumed_to_all_of_them(tmp_path):
             if self.left == 0:
                 raise KeyboardInterrupt
 
-    plan, output = backbone_with(levels_v=(0.3, 0.5, 0.8, 1.0)), tmp_path / "stopped.h5"
+    plan, output = backbone_with(levels_v=(0.3, 0.5, 0.8, 1.0), retries=6), tmp_path / "stopped.h5"
     with pytest.raises(KeyboardInterrupt):
         run_plan(plan, late_bench(LATE), output, RunOptions(progress=StopAfter(2)))
     with resume_run(output) as recording:

@@ -34,6 +34,7 @@ def against_truth(name: str, modes: LinearModes, **options: object) -> tuple[np.
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "level_rms_v"), [("magnet-beam", 0.1), ("friction-beam", 0.02)])
 def test_the_shipped_modal_test_finds_the_modes_of_the_virtual_rig(name: str, level_rms_v: float) -> None:
     frequency, damping, shapes = against_truth(name, modal_test(name, level_rms_v))
@@ -52,6 +53,7 @@ def test_ten_times_the_noise_leaves_a_complete_test_and_modes_within_their_error
     assert modes.fit_residual == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_beam_whose_joints_cannot_slip_returns_its_own_damping() -> None:
     modes = modal_test("friction-beam", 0.04, friction=[])
     frequency, damping, shapes = against_truth("friction-beam", modes, friction=[])

@@ -124,6 +124,7 @@ def test_a_linear_rig_returns_its_own_damping(name: str) -> None:
     np.testing.assert_allclose(mode.modal_frequency_hz, modes.frequency_hz[k], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_random_errors_are_those_of_runs_that_differ_by_noise_alone() -> None:
     plan = every(3, "magnet-beam")
     runs = [nonlinear_mode(measured("magnet-beam", seed, plan)) for seed in range(1, 9)]
@@ -159,6 +160,7 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
         assert np.mean(hit) >= 0.9, (quantity, np.mean(hit))
 
 
+@pytest.mark.slow
 def test_scatter_of_the_specimen_from_run_to_run_is_recovered() -> None:
     scatter, plan = {"frequency": 5e-4}, every(7, "magnet-beam")
     found = repeatability([measured("magnet-beam", seed, plan, scatter=scatter) for seed in range(1, 11)])

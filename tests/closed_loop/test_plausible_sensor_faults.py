@@ -153,6 +153,7 @@ def test_a_response_that_dies_between_realisations_of_a_multisine_is_noticed(mon
         assert points[1]["reason"].startswith("channel acc_magnet has")
 
 
+@pytest.mark.slow
 def test_a_response_that_dies_between_the_two_ways_of_a_continuous_backbone_is_noticed(monkeypatch):
     friction = bench_with({"block": 10}, "friction-beam")
     with rig.run("friction-beam/continuous-backbone", bench=friction, seed=1) as run:

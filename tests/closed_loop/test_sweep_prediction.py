@@ -133,6 +133,7 @@ def test_with_the_force_imposed_a_frequency_error_captures_the_slow_sweep() -> N
     assert captured.verdict == "extrapolated far"
 
 
+@pytest.mark.slow
 def test_with_the_force_by_whole_periods_the_slow_sweep_is_captured_outright() -> None:
     """Founding paper, magnet beam's second sweep: six times too large and far beyond its frequency."""
     with recorded_run("magnet-beam/sweep-2") as run:

@@ -73,6 +73,7 @@ def require_points_of_the_virtual_rig(
                 assert point[key] == pytest.approx(wanted[key], rel=tolerance)
 
 
+@pytest.mark.slow
 def test_frames_that_a_bus_loses_are_gaps_that_are_counted_and_leave_the_point_right(monkeypatch, without_wire):
     receive, frames, every = SlcanBus.receive, count(1), 211
 

@@ -32,3 +32,7 @@ class TestVirtualRigWithDelay(VirtualContract):
 
 class TestVirtualRigWithQueue(VirtualContract):
     bench = bench_with(queue_blocks=2)
+
+
+class TestOversampledRig(VirtualContract):
+    bench = bench_with({"oversample": 4})

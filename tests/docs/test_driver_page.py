@@ -15,6 +15,7 @@ from rig.daq import DAQ
 from rig.drivers import driver_names, make_daq
 from rig.errors import ConfigurationError, DaqDisconnected, DaqRefused
 from tests.docs.pages import ROOT, blocks, write
+from tests.hardware.projects import FORKED_PYTEST
 from tests.refused import refused
 
 FOLDER: list[Path] = []
@@ -50,8 +51,9 @@ def test_the_driver_of_the_page_is_found_by_its_entry_point():
     assert type(make_daq(bench())).__name__ == "BoxDAQ"
 
 
+@pytest.mark.slow
 def test_the_tests_of_the_page_pass_and_pull_the_cable():
-    command = [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "test_box.py"]
+    command = [sys.executable, *FORKED_PYTEST, "-q", "-rs", "-p", "no:cacheprovider", "test_box.py"]
     path = os.pathsep.join([str(FOLDER[0]), str(ROOT)])
     env = {**os.environ, "PYTHONPATH": path, "PYTEST_ADDOPTS": ""}
     done = subprocess.run(command, cwd=FOLDER[0], env=env, capture_output=True, text=True, check=False)

@@ -12,6 +12,7 @@ import tomllib
 import pytest
 
 from tests.docs.pages import ROOT
+from tests.hardware.projects import FORKED_PYTEST
 
 TEMPLATE = ROOT / "docs" / "driver-template"
 PLUGIN = [] if importlib.util.find_spec("rig.pytest_plugin") is None else ["-p", "rig.pytest_plugin"]
@@ -62,6 +63,7 @@ def _run(site, *arguments):
     )
 
 
+@pytest.mark.slow
 def test_the_template_passes_rig_conformance(site):
     done = _run(site, "-c", "from rig.cli import main; main()", "conformance", "--bench", "box-bench.toml", "--json")
     report = json.loads(done.stdout)
@@ -71,8 +73,9 @@ def test_the_template_passes_rig_conformance(site):
     assert [test["outcome"] for test in report["tests"]].count("passed") >= 18
 
 
+@pytest.mark.slow
 def test_the_templates_own_tests_pass_with_every_duty_tested_that_it_takes_upon_itself(site):
-    done = _run(site, "-m", "pytest", "-q", "-rs", "tests")
+    done = _run(site, *FORKED_PYTEST, "-q", "-rs", "tests")
     assert done.returncode == 0, done.stdout
     assert "safe without the host" in done.stdout
     assert "override witness" not in done.stdout
@@ -80,9 +83,10 @@ def test_the_templates_own_tests_pass_with_every_duty_tested_that_it_takes_upon_
     assert "override bench_for_another_process" not in done.stdout
 
 
+@pytest.mark.slow
 def test_the_template_passes_the_kit_under_pytest_and_the_result_names_it(site):
     arguments = ["--pyargs", "rig.conformance", "--rig-bench", "box-bench.toml", "--rig-result", "result.json"]
-    done = _run(site, "-m", "pytest", "-q", *PLUGIN, "-c", os.devnull, *arguments)
+    done = _run(site, *FORKED_PYTEST, "-q", *PLUGIN, "-c", os.devnull, *arguments)
     assert done.returncode == 0, done.stdout + done.stderr
     result = json.loads((site / "work" / "result.json").read_text())
     assert (result["bench"], result["driver"], result["exit_status"]) == ("box-bench", "box", 0)
@@ -90,6 +94,7 @@ def test_the_template_passes_the_kit_under_pytest_and_the_result_names_it(site):
     assert {test["outcome"] for test in result["tests"]} == {"passed", "skipped"}
 
 
+@pytest.mark.slow
 def test_a_physical_bench_is_not_touched_without_arming(site):
     driver = site / "packages" / "vibrolock_box" / "driver.py"
     text = driver.read_text()
@@ -98,8 +103,7 @@ def test_a_physical_bench_is_not_touched_without_arming(site):
         command = _run(site, "-c", "from rig.cli import main; main()", "conformance", "--bench", "box-bench.toml")
         tests = _run(
             site,
-            "-m",
-            "pytest",
+            *FORKED_PYTEST,
             "-q",
             *PLUGIN,
             "-c",

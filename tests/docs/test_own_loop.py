@@ -30,6 +30,7 @@ def found():
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_the_controller_alone_is_imported(found):
     assert found[0] == []
 

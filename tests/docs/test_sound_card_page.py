@@ -38,6 +38,11 @@ def interrupted_after_a_point(words):
     return said
 
 
+def _end(process):
+    process.send_signal(signal.SIGINT)
+    return process.communicate(timeout=LONG_S)
+
+
 @contextmanager
 def emulated_card(words):
     """The emulated card while the context lasts; it ends as after Ctrl-C."""
@@ -45,9 +50,10 @@ def emulated_card(words):
         try:
             assert "device structure" in card.stdout.readline(), card.stderr.read()
             yield
-        finally:
-            card.send_signal(signal.SIGINT)
-            out, err = card.communicate(timeout=LONG_S)
+        except BaseException as error:
+            error.add_note(f"the card: {_end(card)}")
+            raise
+        out, err = _end(card)
     assert card.returncode == 0, err
     assert out.startswith("ended: ")
 

@@ -94,6 +94,7 @@ def test_functions_that_call_themselves_have_no_longest_path(measures: SimpleNam
         graph.path("a")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wire", ["serial", "CAN FD"])
 def test_trace_and_timer_count_the_same_and_a_sample_takes_a_part_of_its_time(
     measures: SimpleNamespace, wire: str, build: Path, traced: Callable[[str], Any]

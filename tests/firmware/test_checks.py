@@ -85,6 +85,7 @@ def test_cppcheck_says_nothing(with_loop: bool) -> None:
     assert (said.returncode, said.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_both_compilers_say_nothing(compiler: str, tmp_path: Path) -> None:
     _needs("make", compiler)

@@ -41,6 +41,7 @@ def hosts() -> list[Host]:
     return [random_script(seed, ACTIONS) for seed in SEEDS]
 
 
+@pytest.mark.slow
 def test_emulator_and_firmware_do_the_same(program: Path, hosts: list[Host]) -> None:
     for seed, host in zip(SEEDS, hosts, strict=True):
         firmware = run_firmware(program, host.python.script(host.events))

@@ -27,6 +27,7 @@ def require_as_in_python(settings: TickSettings, samples: int | None = None) -> 
     return len(found[1])
 
 
+@pytest.mark.slow
 def test_the_first_samples_of_a_plan_are_those_of_the_loop_in_python():
     assert require_as_in_python(all_kinds(), 400) >= 400
 
@@ -37,5 +38,6 @@ def test_a_whole_plan_decides_at_every_sample_what_the_loop_in_python_does(plan)
     assert require_as_in_python(plan()) > 5000
 
 
+@pytest.mark.slow
 def test_the_image_for_the_nucleo_links_with_the_loop():
     assert built_with_loop("nucleo-h743zi2").is_file()

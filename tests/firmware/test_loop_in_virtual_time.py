@@ -4,6 +4,7 @@ A tone is played to the structure of the script's board, whose first channel rea
 """
 
 import numpy as np
+import pytest
 
 from rig.firmware.signature import arguments_for
 from rig.tick.kernels import tick_block
@@ -155,6 +156,7 @@ def require_equal(blocks: list[Rows], missed: tuple[int, ...] = ()) -> None:
         assert one.readings.tobytes() == wanted[at].tobytes(), one.first
 
 
+@pytest.mark.slow
 def test_requests_of_any_kind_feed_the_watchdog_and_nothing_else_does():
     script = Script()
     script.stay(0.9)

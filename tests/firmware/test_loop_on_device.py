@@ -99,6 +99,7 @@ def require_equal(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, .
     assert one[0].tobytes() == other[0].tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", [all_kinds, with_levels_in_newtons])
 def test_in_lockstep_a_whole_plan_is_to_the_bit_that_of_the_loop_in_python(plan):
     settings = plan()
@@ -167,6 +168,7 @@ def test_the_first_sample_of_a_segment_that_begins_with_a_block_is_told_with_tha
     assert {begin + 1 for begin in begins} <= told
 
 
+@pytest.mark.slow
 def test_it_tells_the_digest_of_the_loop_that_is_linked_in_and_its_room():
     with loop_host() as host:
         host.set_up(loop=0)

@@ -10,17 +10,21 @@ import uuid
 from pathlib import Path
 
 from tests.docs.pages import ROOT
+from tests.forking import FORKED
 from tests.waiting import LONG_S
 
 INSTALLED = any(entry.value == "rig.pytest_plugin" for entry in importlib.metadata.entry_points(group="pytest11"))
 PLUGIN = [] if INSTALLED else ["-p", "rig.pytest_plugin"]
 MARK = "VIBROLOCK_TEST_RUN"
+PYTEST = ("-m", "pytest")
+FORKED_PYTEST = ("-c", f"{FORKED}import sys, pytest; sys.exit(pytest.main())")
+"""The same in a process that has loaded the product."""
 
 
-def started(folder, *arguments):
-    """pytest in that folder, running, and the mark that it and all its children carry."""
+def started(folder, *arguments, how=PYTEST):
+    """pytest in that folder, running, and the mark that a new interpreter and all its children carry."""
     mark = uuid.uuid4().hex
-    command = [sys.executable, "-m", "pytest", "-q", *PLUGIN, "--rig-result", "result.json", *map(str, arguments)]
+    command = [sys.executable, *how, "-q", *PLUGIN, "--rig-result", "result.json", *map(str, arguments)]
     process = subprocess.Popen(
         command,
         cwd=folder,
@@ -35,7 +39,7 @@ def started(folder, *arguments):
 
 def ended(folder, *arguments):
     """pytest in that folder, at its end: exit status, text, result file, outcome and reason by the name of the test."""
-    process, _ = started(folder, *arguments)
+    process, _ = started(folder, *arguments, how=FORKED_PYTEST)
     text, _ = process.communicate(timeout=LONG_S)
     path = folder / "result.json"
     result = json.loads(path.read_text()) if path.exists() else {"tests": []}

@@ -38,6 +38,7 @@ def test_c_goes_on(armed_rig):
 """
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_and_a_strict_project_of_ones_own(tmp_path):
     page = ROOT / "docs" / "how-to" / "test-my-bench-with-pytest.md"
     (example,) = (block for block in blocks(page) if block.file == "test_bench.py")
@@ -126,6 +127,7 @@ def test_b():
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_mid_test_ramps_down_and_leaves_no_process(tmp_path):
     (tmp_path / "test_own.py").write_text(INTERRUPTED)
     process, mark = started(tmp_path, "--rig-emulate", "serial")
@@ -148,6 +150,7 @@ def test_ctrl_c_in_mid_test_ramps_down_and_leaves_no_process(tmp_path):
     assert alive(mark) == []
 
 
+@pytest.mark.slow
 def test_one_device_is_not_tested_by_two_processes_and_virtual_ones_are(tmp_path):
     pytest.importorskip("xdist")
     (tmp_path / "wired.toml").write_text(

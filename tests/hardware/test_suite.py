@@ -8,12 +8,12 @@ import sys
 import pytest
 
 from tests.docs.pages import ROOT
-from tests.hardware.projects import PLUGIN
+from tests.hardware.projects import FORKED_PYTEST, PLUGIN
 
 
 def _pytest(folder, *arguments):
     result = folder / "result.json"
-    command = [sys.executable, "-m", "pytest", "-q", *PLUGIN, "-c", os.devnull, "--rig-result", result, *arguments]
+    command = [sys.executable, *FORKED_PYTEST, "-q", *PLUGIN, "-c", os.devnull, "--rig-result", result, *arguments]
     done = subprocess.run(
         [str(part) for part in command],
         cwd=folder,
@@ -40,6 +40,7 @@ def test_the_suite_passes(tmp_path, wire):
     assert not wire or result["device"]["firmware"]
 
 
+@pytest.mark.slow
 def test_a_bench_that_is_missing_or_out_of_reach_is_an_error_and_no_skip(tmp_path):
     gone = tmp_path / "gone.toml"
     gone.write_text('base = "magnet-beam"\n[driver]\nname = "serial"\noptions.port = "/dev/no-such-port"\n')
@@ -75,6 +76,7 @@ def test_e():
 """
 
 
+@pytest.mark.slow
 def test_what_a_bench_has_not_is_skipped_with_the_reason_and_a_failed_test_leaves_it_closed(tmp_path):
     (tmp_path / "test_own.py").write_text(OWN)
     done, result = _pytest(tmp_path, "test_own.py")

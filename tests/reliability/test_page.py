@@ -1,5 +1,7 @@
 """The page of the campaign has a place for every part, and what is written there is what the parts print."""
 
+import pytest
+
 from tests.docs.pages import ROOT
 from tests.reliability.__main__ import LONG, carried_out, marks, tables_in
 from tests.reliability.pages import between
@@ -24,6 +26,7 @@ def test_only_the_tables_of_what_is_printed_are_kept():
     assert tables_in("a line\n| a |\n|---|\n\nsaid\n| b |\n") == "| a |\n|---|\n\n| b |"
 
 
+@pytest.mark.slow
 def test_a_part_is_carried_out_by_its_command():
     said = []
     status, output = carried_out("mutations", ("--files", "4"), said.append)

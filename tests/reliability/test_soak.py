@@ -10,6 +10,7 @@ if sys.platform == "win32":
 from tests.reliability.soak import soak, table
 
 
+@pytest.mark.slow
 def test_a_short_soak_counts_its_samples_and_is_ended_in_order():
     found = soak(0.05, 1000.0, 50)
     assert found.rows_wrong == 0

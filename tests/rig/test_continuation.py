@@ -120,6 +120,7 @@ def test_outputs_far_ahead_from_before_arm_take_no_room_from_those_after_it() ->
     assert device.at(60)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(data=st.data(), n=st.sampled_from([1, 3, 5, 16, 50]))
 def test_blocks_in_any_order_are_continued_as_the_page_says(data: st.DataObject, n: int) -> None:

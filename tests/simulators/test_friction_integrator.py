@@ -31,6 +31,7 @@ def errors() -> dict[int, float]:
     return result
 
 
+@pytest.mark.slow
 def test_force_error_of_the_friction_beam_against_dop853_meets_the_table(errors: dict[int, float]) -> None:
     for substeps, allowed in ALLOWED.items():
         assert errors[substeps] < allowed

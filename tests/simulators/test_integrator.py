@@ -41,6 +41,7 @@ def errors(request: pytest.FixtureRequest) -> tuple[str, dict[int, float], float
     return specimen, result, float(largest)
 
 
+@pytest.mark.slow
 def test_transient_is_a_strong_one(errors: tuple[str, dict[int, float], float]) -> None:
     assert errors[2] == pytest.approx(0.45, abs=0.01)
 

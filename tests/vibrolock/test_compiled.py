@@ -53,6 +53,7 @@ def answer(tmp_path):
     return ask
 
 
+@pytest.mark.slow
 def test_what_goes_into_a_kernel_compiles_it_anew_and_a_comment_does_not(answer):
     assert answer() == (2.5, 0)
     assert answer() == (2.5, 1)
@@ -87,6 +88,7 @@ def test_digests_are_the_same_in_every_process():
     assert len(answers.pop()) > 500
 
 
+@pytest.mark.slow
 def test_a_type_of_argument_that_stands_in_another_module_now_compiles_anew(tmp_path):
     (tmp_path / "summing.py").write_text(
         "from vibrolock.compiled import kernel\n\n@kernel\ndef total(pair):\n    return pair.a + pair.b\n"
@@ -217,6 +219,7 @@ print(power(2.0, 3), ",".join(told))
     assert run(code, **cold) == ["14.0", "8.0"]
 
 
+@pytest.mark.slow
 def test_what_is_compiled_for_kernels_after_a_call_from_python_is_not_taken_for_what_python_calls(tmp_path):
     cold = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     assert run("print(half(2), quarter(2.0))", **cold) == [
@@ -224,6 +227,55 @@ def test_what_is_compiled_for_kernels_after_a_call_from_python_is_not_taken_for_
         "0.5",
     ]  # half: integers for Python, floats for quarter
     assert run("print(half(2.0))", **cold) == ["1.0"]
+
+
+CALLBACK = """
+from vibrolock.compiling import on_compiling
+from vibrolock.foreign_calls import DOUBLE, compiled_for_c
+told = []
+on_compiling.append(told.append)
+
+@kernel
+def factor() -> float:
+    return {factor}
+
+def scaled(x):
+    return factor() * x
+
+print(compiled_for_c(scaled, DOUBLE, DOUBLE).ctypes(3.0), ",".join(told))
+"""
+
+
+@pytest.mark.slow
+def test_what_code_of_others_calls_is_stored_and_compiled_anew_with_what_it_calls(tmp_path):
+    cold = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run(CALLBACK.format(factor=2.0), **cold) == ["6.0", "scaled,factor"]
+    assert run(CALLBACK.format(factor=2.0), **cold) == ["6.0"]
+    assert run(CALLBACK.format(factor=5.0), **cold) == ["15.0", "scaled,factor"]
+
+
+@pytest.mark.slow
+def test_what_only_kernels_call_is_text_and_becomes_machine_code_within_what_python_calls(tmp_path):
+    shown = """
+def kept(library):
+    try:
+        return len(library._get_compiled_object()) > 0
+    except RuntimeError:  # none was made
+        return False
+
+for made in (half._inner, quarter._dispatcher):
+    print([kept(one.library) for one in made.overloads.values()])
+"""
+    cold = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run(f"print(quarter(1.0)){shown}", **cold) == ["0.25", "[False]", "[True]"]
+    other = """
+@kernel
+def eighth(x: float) -> float:
+    return half(half(half(x)))
+
+print(eighth(1.0), sum(half._inner.stats.cache_hits.values()))
+"""
+    assert run(other, **cold) == ["0.125", "1"]  # of stored text
 
 
 SLOW = """

@@ -21,7 +21,6 @@ from tools import table
 
 WINDOWS = [(0, 250), (2500, 250), (6000, 250)]
 PARTS = {
-    "readings, their watches and limits": ("read_inputs", "watch_input"),
     "`sin`, `cos`": ("sin", "cos", "__kernel_sin", "__kernel_cos", "__ieee754_rem_pio2", "fabs"),
     "`atan2`": ("atan2", "__ieee754_atan2", "atan"),
     "the block: flags, continuation, call with its arguments": ("vibrolock_tick_block",),
@@ -41,7 +40,7 @@ def part_of(function: str) -> str:
     for part, names in PARTS.items():
         if function in names or (function.startswith("_Z") and any(name in function for name in names)):
             return part
-    return "detector, laws, sequencer, guard, row"
+    return "readings, detector, laws, sequencer, guard, row"
 
 
 def by_part(program: Path, folder: Path, samples: images.Samples) -> Counter[str]:

@@ -53,7 +53,7 @@ def coupled_run(
 
     system, count, loop = model.system, passes.count, passes.loop
     system = system._replace(steps=1)
-    states, u, motion = np.empty((count, 3, len(model.omega))), np.empty((count, 1)), np.empty(count)
+    states, u, motion = np.empty((count, 3, len(model.omega))), np.zeros((count, 1)), np.empty(count)
     shape = np.append(model.output_shapes[at.output], model.direct[at.output, at.row])
     xi, after = np.empty(loop.b.size), np.empty(loop.b.size)
     state, before, work = np.empty(system.size), np.empty(system.size), workspace_for(system)
@@ -165,17 +165,21 @@ def run_coupled(
 
     Writes ``states`` [N, 3, n], the force ``u`` [N, 1] and ``motion`` (float[N], the output at the drive point); ``xi``,
     ``after`` (float[n_xi]), ``state`` and ``before`` [`System.size`] are work arrays. The force at the end of a step acts on
-    that step and on the output there: it is the solution of a scalar equation, found by the secant method that begins with
-    the ``gain`` of the linear part. Returns N, or the first sample at which no force is found.
+    that step and on the output there: it is the solution of a scalar equation, found by the secant method. This begins with
+    the force that ``u`` holds from the pass before (zeros in the first one), changed as that of the last sample has, and with
+    the slope found there; at first with the ``gain`` of the linear part. Returns N, or the first sample at which no force is
+    found.
     """
     n, count = system.omega.size, given.size
     largest = largest_of(given)
     state[:], xi[:], work.unsolved[0] = 0.0, 0.0, 0
-    new = 0.0
+    changed, slope = 0.0, 1.0 - loop.d * gain
     for k in range(count):
         free = free_force(loop, xi, given[k])
         copy(state, before)
-        at, short, slope, found = 0.0, 0.0, 1.0 - loop.d * gain, False
+        at, short, found = 0.0, 0.0, False
+        known = u[k, 0]
+        new = known + changed
         for trial in range(ITERATIONS):
             u[k, 0] = new
             copy(before, state)
@@ -194,5 +198,6 @@ def run_coupled(
             at, short, new = new, left, following
         if not found or not np.isfinite(motion[k]):
             return int(k)
+        changed = new - known
         advance_filter(loop, xi, after, motion[k])
     return int(count)

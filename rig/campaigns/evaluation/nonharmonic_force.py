@@ -6,12 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.signals import unwrapped
+from identification.signals import EvenPhase, unwrapped
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.rows import Rows
 
 FEWEST_PERIODS = 14  # with fewer periods, lines between two harmonics cannot be separated from the harmonics
+HIGHEST_ORDER = 12.5  # times the output frequency up to which lines count; chosen: twice what any loop follows
 LONGEST = 2**18  # samples whose spectrum is computed at once: with more, memory would grow with the record
 MAIN_LOBE = 4.4  # half width of a line, in bins, with some room
 STANDS_OUT = 15.0  # times the noise: of a million bins of noise alone, one is that high
@@ -23,8 +24,8 @@ def nonharmonic_force(bench: Bench, pieces: Sequence[Rows]) -> float:
 
     The spectral lines between the harmonics of the output frequency count if they exceed 15 times the noise, which is the
     median of all lines between harmonics. Therefore neither the noise of a force sensor nor harmonics above the evaluated ones
-    count. Lines within ``MAIN_LOBE`` bins of a harmonic are ignored. Returns NaN if every piece is shorter than
-    `FEWEST_PERIODS`.
+    count. Lines within ``MAIN_LOBE`` bins of a harmonic are ignored, and lines above `HIGHEST_ORDER`, where no loop acts: they
+    are rounding of the output. Returns NaN if every piece is shorter than `FEWEST_PERIODS`.
 
     Of a piece of more than ``LONGEST`` samples, stretches of equal length are compared with their own noise each.
     """
@@ -66,11 +67,10 @@ def _spectrum(bench: Bench, rows: Rows) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     channel = bench.index_of("force")
     force = bridged(rows, slice(channel, channel + 1))[:, 0]
-    turns = 2.0 * math.pi * np.arange(force.size) / force.size
-    window = np.polynomial.chebyshev.chebval(np.cos(turns), WINDOW)  # cos(k x) = T_k(cos x)
+    window = EvenPhase(0.0, 2.0 * math.pi / force.size, force.size, len(WINDOW) - 1).signal(np.array(WINDOW))
     lines = np.fft.rfft(window * (force - force.mean()))
     power = lines.real**2 + lines.imag**2
     orders = np.arange(power.size) / (periods * force.size / (force.size - 1))
     between = np.abs(orders - np.rint(orders)) > MAIN_LOBE / periods
-    kept = orders > 0.5
+    kept = (orders > 0.5) & (orders < HIGHEST_ORDER)
     return power[kept], between[kept]

@@ -41,6 +41,9 @@ class LockedPlan(Levels, Plan):
     near_limits: float = Field(1.0, gt=0, le=1)
     """Part of the bench's limits of force, acceleration and displacement. A level that brings a channel beyond it in its ramp
     up, or while it settles, is given up with those above it, as after a lost lock. With 1 only the limits themselves act."""
+    noise_shaping: bool = False
+    """Whether the error by which an output was rounded to the converter's bits (``output_resolution_v`` of the bench) is fed
+    back into the next one: it then lies at high frequencies, not around that of the test. For outputs of few bits."""
     on_failure: Literal["skip", "stop"] = "skip"
     """What follows a failed point: ``skip`` goes on with the next point, ``stop`` ramps down and ends the run."""
 
@@ -221,6 +224,10 @@ class SettledPlan(LockedPlan):
     point is accepted. The filter of the detector hides changes late in a record."""
     on_lost_lock: Literal["skip", "stop"] = "stop"
     """What follows when a held lock is lost: ``stop`` trips, ``skip`` seeks the lock again at the next point."""
+    lost_lock_attempts: int = Field(1, ge=1, le=3)
+    """How often a point that loses its lock is tried in a run, with the points that were not reached for it. Each further
+    attempt is a part of its own, once the plan is over: from the level before, with ramps of twice the length. Of a plan with
+    ``on_lost_lock = "skip"``."""
 
     @property
     def settle_rule(self) -> SettleRule:

@@ -122,5 +122,6 @@ def measured_before_repeat(
     accepted = {point.number for point in known if point.accepted}
     done = frozenset(place for place, number in enumerate(numbers) if number in accepted)
     given_up = frozenset(range(len(numbers))) - done - again
-    refused = {place: (*attempts.get(place, ()), attempt_at(last[numbers[place]])) for place in again}
+    tried = (place for place in again if numbers[place] in last)
+    refused = {place: (*attempts.get(place, ()), attempt_at(last[numbers[place]])) for place in tried}
     return MeasuredBefore(done, numbers, known, given_up, refused)

@@ -25,6 +25,7 @@ from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.transient_disturbance import refused_for_a_transient
 from rig.campaigns.evaluation.vibrations import failed_point, not_evaluated
 from rig.campaigns.kinds import KINDS
+from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Plan, Target
 from rig.campaigns.running.attempts import MeasuredBefore, RefusedRecords, after_attempts, measured_before_repeat
 from rig.campaigns.running.device_remarks import with_device_remarks, with_disorder
@@ -110,6 +111,7 @@ class Execution:
         self.attempts: dict[int, tuple[Attempt, ...]] = dict(before.attempts)
         self.refused = RefusedRecords()
         self.passing: set[int] = set()
+        self.lost_lock: set[int] = set()
         self.next_segment = 0
         self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
@@ -381,6 +383,9 @@ class Execution:
         point = after_attempts(point, self.attempts.get(number, ()))
         if point.quality is not Quality.REJECTED or point.attempts > self.plan.retries:
             self.passing.discard(number)
+        again = isinstance(self.plan, SettledPlan) and point.attempts < self.plan.lost_lock_attempts
+        if point.quality is Quality.LOST_LOCK and again:
+            self.lost_lock.add(number)
         point = replace(point, number=self.numbers[number])
         self.known.append(point)
         self._write("point", self.journal.point, stored(point))
@@ -391,9 +396,16 @@ class Execution:
 
     @property
     def to_repeat(self) -> frozenset[int]:
-        """Numbers in the plan of points refused for something that passes, once the whole plan was carried out."""
+        """Numbers in the plan of points worth another attempt, once the plan was carried out.
+
+        They were refused for something that passes, or have lost their lock, and with these the points that were not reached.
+        """
         completed = EndReason(int(self.tick.guard["reason"][0])) is EndReason.COMPLETED and self.loop.failure is None
-        return frozenset(self.passing) if completed else frozenset()
+        if not completed:
+            return frozenset()
+        places = (target.number for target in self.targets if target.number not in self.measured_before)
+        untried = {place for place in places if self.lost_lock and self.numbers[place] not in self.reported}
+        return frozenset(self.passing | self.lost_lock | untried)
 
     def measured_before_repeat(self, points: Iterable[Mapping[str, object]]) -> MeasuredBefore:
         """Return what was measured before the next attempts at `to_repeat`; ``points``: all of the recording."""

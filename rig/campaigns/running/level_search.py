@@ -35,10 +35,14 @@ class MultisineSeries:
         )
         self._begun = False
 
-    def play(self, plan: MultisinePlan) -> Recording:
-        """Play a multisine and return the recording with it as the last part. The first call creates the recording."""
+    def play(self, plan: MultisinePlan, *, after_silence: bool = False) -> Recording:
+        """Play a multisine and return the recording with it as the last part. The first call creates the recording.
+
+        ``after_silence``: the last one tripped because a channel read nothing, which allows a higher level.
+        """
         if self._begun:
-            return resume_run(self.output, replace(self._options, seed=None), change=plan, trust_code=True)
+            options = replace(self._options, seed=None)
+            return resume_run(self.output, options, change=plan, retry_tripped=after_silence, trust_code=True)
         self._begun = True
         return run_plan(plan, self.bench, self.output, self._options)
 

@@ -8,6 +8,7 @@ import numpy as np
 from rig.campaigns.evaluation.rows import LongRows, Rows, Spool
 from rig.errors import RecordingError
 from rig.recording.parts import missing_rows
+from vibrolock.arrays import undivided
 
 IN_MEMORY_BYTES = 32 * 2**20  # bytes of rows in memory; more go to files; chosen
 
@@ -65,7 +66,8 @@ class RowBuffer:
             if start + rows.size <= first:
                 continue
             taken_rows = slice(max(0, first - start), min(rows.size, end - start))
-            out[max(0, start - first) : min(end, start + rows.size) - first] = rows[taken_rows]
+            place = slice(max(0, start - first), min(end, start + rows.size) - first)
+            undivided(out)[place] = undivided(rows)[taken_rows]
             if start + rows.size > end:
                 self._chunks.appendleft((start, rows))
                 self._bytes += rows.nbytes

@@ -216,10 +216,11 @@ class _Run:
         return continue_recording(self.output, row_dtype=recorded_row(len(self.bench.channels)), columns=columns)
 
     def with_further_attempts(self, recording: Recording, execution: Execution, facts: About) -> Recording:
-        """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
+        """Measure again, in a part of their own, the points that are worth it (`Execution.to_repeat`); return the recording.
 
-        They are approached as the plan says, as in a resumed run. The run stays armed. It ends when no such point is left, or
-        none with attempts left, and where the device has latched meanwhile: only a person clears that.
+        They are approached as the plan says, as in a resumed run, and after a lost lock more slowly. The run stays armed. It
+        ends when no such point is left, or none with attempts left, and where the device has latched meanwhile: only a person
+        clears that.
         """
         progress = self.options.progress
         while again := execution.to_repeat:
@@ -239,7 +240,10 @@ class _Run:
                 if self.live.stop_requested:  # while the device was opened
                     return Recording(self.output)
                 names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
-                progress.remark(f"repeating point {names}: the disturbance may be over")
+                if execution.lost_lock:
+                    progress.remark(f"point {names} once more: from the level before, with ramps of twice the length")
+                else:
+                    progress.remark(f"repeating point {names}: the disturbance may be over")
                 try:
                     choice = settled_queue(self.plan, self.bench, session, self.options, before.done | before.given_up)
                 except ConfigurationError as error:
@@ -247,9 +251,16 @@ class _Run:
                     return Recording(self.output)
                 about = with_queue({**facts, "device": session.identity}, choice)
                 information: Information = {"first_sample": first_sample, "seed": seed, "about": about}
-                execution = self.measure(session, self.further_journal, information, before)
+                run = replace(self, plan=slower(execution.plan)) if execution.lost_lock else self
+                execution = run.measure(session, self.further_journal, information, before)
             recording = _whole(self.output, progress)
         return recording
+
+
+def slower(plan: Plan) -> Plan:
+    """Return a plan with ramps of twice the length, if it has ramps between levels."""
+    periods = getattr(plan, "ramp_periods", None)
+    return plan if periods is None else plan.model_copy(update={"ramp_periods": 2.0 * periods})
 
 
 def _published(plan: Plan, bench: Bench, output: Path, options: RunOptions) -> AbstractContextManager[Live]:

@@ -12,6 +12,7 @@ def tick_settings(
     plan: Plan, bench: Bench, segments: tuple[Segment, ...], checked: CheckedScale | None = None
 ) -> TickSettings:
     """Return what a tick is built from to measure some segments of a plan; ``checked`` is the scale of the last check."""
+    locked = plan if isinstance(plan, LockedPlan) else None
     return TickSettings(
         bench,
         plan.law,
@@ -22,6 +23,7 @@ def tick_settings(
         plan.known_plant,
         plan.retries,
         start_judged=True,
-        near_limits=plan.near_limits if isinstance(plan, LockedPlan) else 1.0,
+        near_limits=1.0 if locked is None else locked.near_limits,
+        output_bit_v=bench.output_bit_v if locked is not None and locked.noise_shaping else 0.0,
         per_volt=None if checked is None else (checked.newtons_per_volt, checked.acceleration_per_volt),
     )

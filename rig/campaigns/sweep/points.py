@@ -1,5 +1,6 @@
 """Points of a sweep test: their contents, their evaluation from recorded rows, and fundamentals over time."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -157,18 +158,20 @@ def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transien
     return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0)))
 
 
-def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
+def transient_of(bench: Bench, rows: np.ndarray, roles: Collection[str] | None = None) -> Transient:
     """Return the fundamentals over time of recorded rows: every input without its skew, and the output as channel ``voltage``.
 
-    There are no instants where too many samples were lost. Raises `identification.IdentificationError` if no instant is left.
+    ``roles``: those of the channels that are wanted, the force's among them; all if None. There are no instants where too many
+    samples were lost. Raises `identification.IdentificationError` if no instant is left.
     """
     lost = lost_rows(rows)
     inputs = bridged(rows) if lost.any() else rows["inputs"]
-    signals = np.vstack([inputs.T, rows["output_v"]])
-    channels = (*channels_of(bench), VOLTAGE)
+    all_channels = (*channels_of(bench), VOLTAGE)
+    wanted = [row for row, channel in enumerate(all_channels) if roles is None or channel.role in roles]
+    signals, channels = np.vstack([inputs.T, rows["output_v"]])[wanted], [all_channels[row] for row in wanted]
     transient = demodulate(rows["theta_rad"], signals, channels, sample_rate_hz=bench.sample_rate_hz)
-    corrected = transient.fundamentals.copy()
-    corrected[:-1] *= channel_factors(bench, transient.frequency_hz)
+    factors = channel_factors(bench, transient.frequency_hz)
+    corrected = transient.fundamentals * np.vstack([factors, np.ones_like(factors[:1])])[wanted]
     return _without_gaps(replace(transient, fundamentals=corrected), lost, bench.sample_rate_hz)
 
 
@@ -186,14 +189,14 @@ def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float)
     )
 
 
-def recorded_sweeps(recording: Recording) -> dict[int, Transient]:
+def recorded_sweeps(recording: Recording, roles: Collection[str] | None = None) -> dict[int, Transient]:
     """Return the fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
 
-    The output is channel ``voltage``.
+    The output is channel ``voltage``. ``roles``: those of the channels that are wanted, the force's among them; all if None.
     """
     bench = bench_of_recording(recording)
     return {
-        point.number: transient_of(bench, point_rows(recording, point.number))
+        point.number: transient_of(bench, point_rows(recording, point.number), roles)
         for point in accepted_points(recording, SweepResult)
     }
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from rig.continuation import SOURCE, begin, count_at, forget, keep, ring_for
 from rig.drivers.sound.lost_time import CLOCK, IN_DOUBT, lost_frames
+from vibrolock.array_at import array_at
 from vibrolock.compiled import Record, kernel
-from vibrolock.foreign_calls import INT, POINTER, UNSIGNED_LONG, array_at, compiled_for_c, fence, pointer
+from vibrolock.foreign_calls import INT, POINTER, UNSIGNED_LONG, compiled_for_c, fence, pointer
 
 FULL_SCALE = 1 << 23
 """Counts of full scale: a converter of 24 bits."""

@@ -1,5 +1,6 @@
 """The sound devices of this computer, through PortAudio (package ``sounddevice``)."""
 
+import time
 from typing import Any, NamedTuple
 
 from rig.drivers.sound.rates import RATES_HZ
@@ -9,6 +10,9 @@ MISSING = "the package sounddevice is not installed (pip install 'vibrolock[soun
 """What to do where the package is missing."""
 INITIALISATIONS = 3
 """Attempts to initialise PortAudio; chosen: on a busy computer a JACK server may have no time for it."""
+LOOKS, BETWEEN_LOOKS_S = 4, 0.5
+"""Attempts to find a device, and the time between two of them, s; chosen: a JACK server that has not answered in time is no
+error of PortAudio's, its devices are missing."""
 
 
 class SoundDevice(NamedTuple):
@@ -98,18 +102,17 @@ def sound_devices() -> list[SoundDevice]:
 
 
 def found(name: str | int, host_api: str) -> SoundDevice:
-    """Return the device of a name, or of a part of it, or of an index.
+    """Return the device of a name, or of a part of it, or of an index; one that is not there is looked for again for 1.5 s.
 
     Raises `DaqDisconnected` where there is none, `DaqRefused` where there are several.
     """
-    devices = sound_devices()
-    within = [one for one in devices if host_api.casefold() in one.host_api.casefold()]
-    if isinstance(name, int):
-        matching = [one for one in within if one.number == name]
-    else:
-        matching = [one for one in within if one.name == name] or [
-            one for one in within if name.casefold() in one.name.casefold()
-        ]
+    for look in range(LOOKS):
+        if look:
+            time.sleep(BETWEEN_LOOKS_S)
+        devices = sound_devices()
+        matching = _called(name, [one for one in devices if host_api.casefold() in one.host_api.casefold()])
+        if matching:
+            break
     if len(matching) == 1:
         return matching[0]
     field = "driver.options.device"
@@ -128,6 +131,13 @@ def found(name: str | int, host_api: str) -> SoundDevice:
         allowed=_listed(matching),
         hint="add driver.options.host_api, or give the whole name",
     )
+
+
+def _called(name: str | int, devices: list[SoundDevice]) -> list[SoundDevice]:
+    if isinstance(name, int):
+        return [one for one in devices if one.number == name]
+    exactly = [one for one in devices if one.name == name]
+    return exactly or [one for one in devices if name.casefold() in one.name.casefold()]
 
 
 def _listed(devices: list[SoundDevice]) -> str:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -59,10 +59,11 @@ class VirtualDAQ(DAQ):
     It returns at once: pacing is the loop's. Not modelled: jitter, a device that fails.
     """
 
-    wall_clock: ClassVar[bool] = False
+    wall_clock = False
 
     @one_thread()
     def __init__(self, bench: Bench, seed: int = 0) -> None:
+        bench = bench.at_device
         super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
         options = dict(bench.driver.options)
         queue = {key: options.pop(key) for key in list(options) if key in Queue.model_fields}

@@ -30,6 +30,8 @@ from rig.text.durations import duration
 
 SLOW, FAST = 5.0, 20.0
 """Times real time of predicted sweeps, with reading them: of a structured model with an exciter on two machines."""
+COMPARED = ("force", "drive")
+"""Roles of the channels of a sweep that a comparison shows."""
 
 
 def expected_duration(recordings: Sequence[Path], plans: Sequence[str]) -> str:
@@ -137,5 +139,5 @@ def _between_crossings(recording: Recording, number: int, which: str) -> HalfPer
 
 def force_and_drive(sweep: Transient) -> Transient:
     """Return only the channels of a sweep that a comparison shows, force and drive."""
-    rows = [row for row, channel in enumerate(sweep.channels) if channel.role in ("force", "drive")]
+    rows = [row for row, channel in enumerate(sweep.channels) if channel.role in COMPARED]
     return replace(sweep, channels=tuple(sweep.channels[row] for row in rows), fundamentals=sweep.fundamentals[rows])

@@ -31,6 +31,7 @@ from rig.results.simulated.options import SimulatedPrediction
 from rig.results.simulated.steady import compared, default_held
 from rig.results.simulated.sweep_models import SimulatedSweepModels
 from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simulated_sweeps
+from vibrolock.one_thread import one_thread
 
 _DRAWS = 40
 """Models of a band."""
@@ -40,6 +41,7 @@ _ANYWHERE = 1e3
 """Use of the trained range up to which responses of the ends of what the data leave open are followed."""
 
 
+@one_thread()
 def predict(path: Path, request: SimulatedPrediction) -> Predictions:
     """Return the requested predictions, with errors where there is a reference. Unbounded runs are also results.
 

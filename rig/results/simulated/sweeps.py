@@ -21,7 +21,7 @@ from rig.measurements.experiments.signals import Signals
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.reader import Recording
 from rig.results.predictions.references import Swept
-from rig.results.predictions.sweeps import force_and_drive, planned, strangers
+from rig.results.predictions.sweeps import COMPARED, planned, strangers
 from rig.results.simulated.driven_models import DrivenModel, check_rate, with_constants
 from rig.results.simulated.sweep_models import SimulatedSweepModels, SweepGiven
 from rig.tick.layout import SAMPLE_LOST
@@ -41,12 +41,12 @@ def recorded_simulated_sweeps(path: Path, models: SimulatedSweepModels) -> Itera
             *strangers(bench_of_recording(recording), models.model.specimen, models.exciter, str(path)),
             *points_left_out(recording),
         )
-        recorded = sweeps(recording)
+        recorded = sweeps(recording, roles=COMPARED)
         for number, sweep in recorded.items():
             name = path.stem if len(recorded) == 1 else f"{path.stem} [{number + 1}]"
             given, more = _recorded(recording, number, models)
             predicted = models.predict(given)
-            yield Swept(predicted, force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), (*notes, *more))
+            yield Swept(predicted, sweep, compare_sweep(predicted, sweep, name=name), (*notes, *more))
 
 
 def planned_simulated_sweeps(plan_source: str, models: SimulatedSweepModels) -> Iterator[Swept]:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from controller.kernels import LOCKED, LOST, STEEP_PERIODS, VOLTAGE, reacquire
+from controller.kernels import LOCKED, LOST, STEEP_PERIODS, VOLTAGE, begin_ramp, forget_lag, reacquire
 from rig.tick.safety.kernels import shut_down
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.judgement import (
@@ -158,6 +158,8 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
         progress.faulty_before = math.inf
     entry.outcome = Outcome.RUNNING
     entry.first_sample = progress.sample
+    if is_ramp(segment.kind):
+        begin_ramp(lock)
     if is_ramp(segment.kind) and lock.state == LOST:
         reacquire(lock)
         progress.returning = 1 if 0.0 < progress.kept_level < progress.level else 0
@@ -316,8 +318,10 @@ def advance(
     if climbs and progress.unreached == 1:
         progress.frozen_cycles += passed
     elif climbs and waits_for_phase(progress, segment):
+        if progress.held + progress.continued + progress.lost > 0:
+            forget_lag(lock)
         progress.waited_cycles += passed * lock.slowing
-        progress.slowed_cycles += passed * max(lock.steep_slowing - lock.slowing, 0.0)
+        progress.slowed_cycles += passed * max(max(lock.steep_slowing, lock.lag_slowing) - lock.slowing, 0.0)
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
         step_ramp(progress, segments, outcomes, settling, lock, guard, elapsed)

@@ -54,6 +54,37 @@ def test_noise_of_a_percent_leaves_the_plant_usable(name, seed):
     assert found.fit_error == pytest.approx(0.01, rel=0.2)
 
 
+def with_noise(force, acceleration, share, **options):
+    """The plant of responses with noise of a share of each, whose covariance is given."""
+    noise = [share * np.sqrt(np.mean(np.abs(values) ** 2)) for values in (force, acceleration)]
+    covariance = np.broadcast_to(np.diag(np.square(noise)).astype(complex), (force.size, 2, 2))
+    std = {"force_std": noise[0], "acceleration_std": noise[1], "covariance": covariance}
+    frequency, _, _ = responses("magnet-beam")
+    return PlantModel.from_frequency_responses(
+        frequency, noisy(force, share, 7), noisy(acceleration, share, 8), **std, **RATE, **options
+    )
+
+
+@pytest.mark.parametrize("share", [0.01, 0.12])
+def test_noise_that_is_known_is_no_error_of_the_fit(share):
+    _, force, acceleration = responses("magnet-beam")
+    lines = force.size
+    assert share / lines**0.25 <= with_noise(force, acceleration, share).fit_error * 1.001
+    assert with_noise(force, acceleration, share).fit_error <= 1.5 * share / lines**0.25
+    assert with_noise(force, acceleration, share).frequency_rad_s == pytest.approx(
+        plant_of("magnet-beam").frequency_rad_s, rel=3e-3
+    )
+
+
+def test_a_second_mode_is_an_error_of_the_fit_whatever_the_noise():
+    frequency, force, acceleration = responses("magnet-beam")
+    s, w = 2j * np.pi * frequency, 2 * np.pi * 28.0
+    more = acceleration + 3.0 * force * s**2 / (s**2 + 0.01 * w * s + w**2)
+    errors = [with_noise(force, more, share).fit_error for share in (1e-4, 0.1)]
+    assert errors[0] > 0.2
+    assert errors[1] == pytest.approx(errors[0], rel=0.15)
+
+
 def test_the_fit_answers_conjugates_at_negative_frequencies():
     plant, s = plant_of("magnet-beam"), 1j * np.linspace(120.0, 180.0, 7)
     np.testing.assert_allclose(plant.force_per_v(-s), plant.force_per_v(s).conj(), rtol=1e-12)
@@ -118,6 +149,30 @@ def test_a_mode_narrower_than_the_lines_is_found_whatever_sign_noise_gives_its_d
     found = PlantModel.from_frequency_responses(*one_mode(1e-6, 1e-3, seed), **RATE)
     assert found.frequency_rad_s == pytest.approx(2 * math.pi * 25.0, rel=1e-3)
     assert 0.0 < found.damping_ratio < 2e-3
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_light_mode_is_found_where_its_force_at_resonance_is_far_below_the_noise(seed):
+    """The ratio of acceleration to force then has its largest values where the noise wills it."""
+    frequency, damping_ratio = np.linspace(47.6, 126.9, 6000), 9.4e-4
+    z = 1j * frequency / 79.3
+    accelerance = 6.6 * z**2 / (z**2 + 2.0 * damping_ratio * z + 1.0) - 1.5 + 0.03 * z**2
+    force = 1.0 / (0.05 + 0.01 * accelerance * (1.0 + (0.58 + 0.02 * z) / z**2))
+    acceleration = accelerance * force
+    noise = [0.15 * np.median(np.abs(values)) for values in (force, acceleration)]
+    assert np.min(np.abs(force)) < 0.1 * noise[0]
+    draws = np.random.default_rng(seed).normal(size=(2, 2, frequency.size)) / math.sqrt(2)
+    read = [
+        values + std * (re + 1j * im) for values, std, (re, im) in zip((force, acceleration), noise, draws, strict=True)
+    ]
+    stds = [np.hypot(std, 0.02 * np.abs(values)) for values, std in zip(read, noise, strict=True)]
+    covariance = np.broadcast_to(np.diag(np.square(noise)).astype(complex), (frequency.size, 2, 2))
+    found = PlantModel.from_frequency_responses(
+        frequency, *read, force_std=stds[0], acceleration_std=stds[1], covariance=covariance, exciter_prior=0.3, **RATE
+    )
+    assert found.frequency_rad_s == pytest.approx(2.0 * math.pi * 79.3, rel=1e-3)
+    assert found.damping_ratio == pytest.approx(damping_ratio, abs=4.0 * found.damping_ratio_std)
+    assert found.damping_ratio_std < 2e-4
 
 
 @pytest.mark.parametrize("damping_ratio", [0.02, 0.05])

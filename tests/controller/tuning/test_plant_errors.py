@@ -57,6 +57,7 @@ def test_without_a_covariance_the_noise_is_taken_from_the_residuals():
     assert np.std(values, axis=0) == pytest.approx(np.mean(errors, axis=0), rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_misfit_beyond_the_stated_noise_increases_the_errors():
     """A covariance that is a hundred times too small is corrected by the ratio of the costs."""
     _, stated = fits("magnet-beam", 1.0, correlation=0.0)

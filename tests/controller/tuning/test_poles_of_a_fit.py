@@ -59,3 +59,11 @@ def test_two_fits_of_a_rig_differ_in_a_growing_pole_beyond_the_band_and_agree_on
 
 def test_a_growing_pole_within_the_band_counts():
     assert unstable_poles(loop_of(replace(OVER_ALL, band_hz=(10.0, 67.57)))) == 2
+
+
+def test_the_coupled_pole_of_an_overdamped_rig_is_none_of_those_that_a_fit_puts_near_zero():
+    plant = replace(OVER_ALL)
+    w = plant.frequency_rad_s
+    growing, slow, rig, quick = 0.001 * w, -0.06 * w, -0.6 * w, -1.5 * w
+    vars(plant)["poles_rad_s"] = np.array([growing, slow, rig, quick, (-0.5 + 2.6j) * w, (-0.5 - 2.6j) * w], complex)
+    assert plant.coupled_pole_rad_s == rig

@@ -18,6 +18,7 @@ def decay():
     return x, CubicSpline(grid, hardening_frequency_hz(grid))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signal_to_noise_db", [20, 40, 60])
 def test_intervals_of_frequency_and_damping_hold_at_least_93_percent(decay, signal_to_noise_db):
     x, frequency_hz = decay

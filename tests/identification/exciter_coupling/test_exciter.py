@@ -61,6 +61,7 @@ def test_without_noise_every_parameter_is_found(unit: str) -> None:
     np.testing.assert_allclose(found.path.coupling_hz, TRUE.path.coupling_hz, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_standard_errors_cover_and_the_residual_is_noise_alone() -> None:
     """Of 20 seeds, 95 % intervals; each parameter alone may miss in a few, all together in 10 % of cases."""
     inside, sums, residuals = [], [], []
@@ -146,6 +147,7 @@ def test_bad_input_is_named() -> None:
         VoltagePath(0.0)
 
 
+@pytest.mark.slow
 def test_an_exciter_that_cannot_be_is_refused_and_a_band_beside_its_resonance_noted() -> None:
     right = multisine_spectra(1e-4)
     reversed_ = right.spectra.copy()

@@ -62,6 +62,7 @@ def test_the_working_responses_have_the_gradient_of_the_likelihood() -> None:
         assert -2.0 * np.sum(np.conj(way) * heavy).real == pytest.approx(numeric, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_modes_come_out_right_where_the_force_is_below_its_noise() -> None:
     truth = np.concatenate([FREQUENCY_HZ, DAMPING, SHAPES.ravel()])
     pulls, residuals = [], []

@@ -73,6 +73,7 @@ def test_the_one_broad_mode_is_found_at_every_level(level, realisations):
     assert np.mean(inside) >= 0.75
 
 
+@pytest.mark.slow
 def test_auto_weights_are_nearer_to_the_pole_than_those_of_noise_or_total_variance():
     _, damping = own_pole(*simulated(LEVELS[3]))
     errors = {

@@ -126,6 +126,7 @@ def test_draws_scatter_as_the_covariance_says():
     assert np.mean(drawn) == pytest.approx(np.log(fit.model.frequency_hz[0]), abs=3e-4)
 
 
+@pytest.mark.slow
 def test_a_band_is_that_of_responses_of_draws():
     fit = fit_of(structured_duffing(), {"frequency 1": 1e-3})
     band = response_band(fit, 0.02, draws=20)

@@ -60,6 +60,13 @@ def test_phases_are_even_over_the_circle() -> None:
         assert abs(np.mean(np.exp(1j * harmonic * phases))) < 4 / np.sqrt(samples)
 
 
+def test_who_changes_a_realisation_changes_no_later_one() -> None:
+    first = DESIGN.realisation(3, 1)
+    kept = first.copy()
+    first[:] = 0.0
+    assert np.array_equal(DESIGN.realisation(3, 1), kept)
+
+
 def test_unit_peak_times_crest_factor_times_rms_is_the_realisation() -> None:
     unit = DESIGN.unit_peak(1, 2)
     assert np.max(np.abs(unit)) == 1.0

@@ -37,6 +37,7 @@ def test_a_plan_too_narrow_for_detection_lines_is_refused_with_the_size_of_its_g
         rig.run(narrow)
 
 
+@pytest.mark.slow
 def test_a_low_level_gives_the_linear_response_of_the_rig_with_its_held_output(spectra):
     beam = VirtualRig.shipped("magnet-beam")
     found = best_linear_approximation(spectra[0.1])

@@ -21,6 +21,7 @@ def run(rng: np.random.Generator, *, scatter: float = 0.0, noise: float = 1e-4, 
     return Backbone(tuple(with_errors(p, rng) for p in stiffer), "beam", PHI)
 
 
+@pytest.mark.slow
 def test_frequency_scatter_of_ten_runs_is_recovered_within_its_statistics() -> None:
     rng = np.random.default_rng(2)
     inside, sizes = [], []
@@ -45,6 +46,7 @@ def test_runs_that_differ_by_noise_alone_have_little_between_them() -> None:
     np.testing.assert_allclose(np.ptp(scattered.modal_frequency_hz, axis=0), scattered.range("modal_frequency_hz"))
 
 
+@pytest.mark.slow
 def test_the_combined_model_holds_what_a_further_run_does() -> None:
     rng = np.random.default_rng(8)
     inside = []

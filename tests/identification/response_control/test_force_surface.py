@@ -90,6 +90,7 @@ def test_a_level_that_was_missed_by_a_percent_costs_nothing() -> None:
     np.testing.assert_allclose(missed.frequency_hz, exact.frequency_hz, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_those_of_repeated_tests() -> None:
     runs = []
     for repeat in range(40):

@@ -58,6 +58,7 @@ def test_a_gain_multiplies_outputs():
         np.testing.assert_allclose(louder.simulate(u).outputs, np.exp(0.1) * model.simulate(u).outputs, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_shifts_of_runs_come_back():
     experiments, shifts = runs(6)
     found, scatter = fit_with_scatter(fitted, experiments[:5], validation=experiments[5:], kinds=("frequency",))

@@ -87,6 +87,7 @@ class BrokenPlant(VirtualPlant):
     def __init__(self, bench: Bench, seed: int, fault: Fault | None, onset: int, needed_v: float) -> None:
         self._given = (bench, seed, fault, onset, needed_v)
         super().__init__(bench, seed, Wiring(tuple(channel.name for channel in bench.channels)))
+        self.before, self.broken = None, BrokenRig(self._rig, *self._given)  # nothing was measured while it was made
 
     def reset(self) -> None:
         """Back to rest."""

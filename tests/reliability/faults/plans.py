@@ -26,6 +26,8 @@ def _quick(specimen: str, low_pass_rad_s: float, **changes: Any) -> dict[str, An
     return _loops(f"{specimen}/backbone", **filtered, **changes)
 
 
+UNSLOWED = {"waiting_deg": 120.0}
+"""A lock whose ramps the phase does not slow: after a slow ramp the short rule takes a force for settled that still falls."""
 MAGNET, FRICTION = ("magnet-beam", 30.62), ("friction-beam", 187.2)
 LEVELS: dict[str, dict[str, Any]] = {
     "V": {"bench": "magnet-beam", "levels_v": [0.6, 0.7, 0.8], "controller": _loops("magnet-beam/backbone")},
@@ -47,7 +49,11 @@ LEVELS: dict[str, dict[str, Any]] = {
         "start_v": 0.3,
         "controller": _loops("magnet-beam/response-controlled"),
     },
-    "V, friction": {"bench": "friction-beam", "levels_v": [0.3, 0.35, 0.4], "controller": _quick(*FRICTION)},
+    "V, friction": {
+        "bench": "friction-beam",
+        "levels_v": [0.3, 0.35, 0.4],
+        "controller": _quick(*FRICTION, lock=UNSLOWED),
+    },
     "N, friction": {
         "bench": "friction-beam",
         "levels_n": [1.0, 1.05, 1.1, 1.15],  # long enough for a sensor to be stuck for half a second

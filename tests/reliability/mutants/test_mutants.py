@@ -141,6 +141,7 @@ def fates(mutants: list[Mutant], *rest, **named) -> dict[str, str]:
 posix = pytest.mark.skipif(sys.platform == "win32", reason="groups of processes are ended by signals of POSIX")
 
 
+@pytest.mark.slow
 @posix
 def test_a_mutant_is_killed_by_the_test_that_fails_and_one_without_a_check_survives(project):
     before = all_of(project)
@@ -149,6 +150,7 @@ def test_a_mutant_is_killed_by_the_test_that_fails_and_one_without_a_check_survi
     assert all_of(project) == before
 
 
+@pytest.mark.slow
 @posix
 def test_tests_of_another_checkout_judge_the_same_mutants(project, tmp_path):
     other = made(
@@ -175,6 +177,7 @@ def test_tests_that_take_too_long_anyway_judge_none(project):
     assert fates(one, project, project, ["fake"], limit_s=0.05) == {"return min(a) -> return max(a)": "not judged"}
 
 
+@pytest.mark.slow
 @posix
 def test_what_no_test_mirrors_and_what_fails_anyway_is_judged_by_none(project):
     (project / "tests" / "fake" / "test_counts.py").write_text("def test_it():\n    assert False\n")

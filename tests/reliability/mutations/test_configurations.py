@@ -20,6 +20,7 @@ def _compiled(tmp_path_factory):
     compiled(tmp_path_factory.mktemp("compiled"))
 
 
+@pytest.mark.slow
 def test_spoilt_configurations_are_refused_in_one_clear_line_or_work(tmp_path):
     verdicts = [(spoilt, judge(spoilt, tmp_path)) for spoilt in spoilt_configurations(150, seed=1)]
     wrong = [f"{s.name} {s.mutations}: {v.text}" for s, v in verdicts if v.outcome == "misbehaved"]

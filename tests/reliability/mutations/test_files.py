@@ -22,6 +22,7 @@ def whole(tmp_path_factory):
     return found, contents_of(found, folder)
 
 
+@pytest.mark.slow
 def test_no_spoilt_file_is_read_with_other_content_unless_that_is_told(tmp_path, whole):
     data, content = whole
     outcomes = Counter()

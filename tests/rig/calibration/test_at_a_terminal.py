@@ -65,6 +65,7 @@ def _take_terminal():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.slow
 def test_a_person_at_the_terminal_is_asked_for_the_reading(tmp_path):
     options = f"options = {{ output_full_scale_v = {FULL_SCALE_V}, input_full_scale_v = {FULL_SCALE_V} }}"
     (tmp_path / "bench.toml").write_text(BENCH.replace('name = "cables"\n\n[l', f'name = "cables"\n{options}\n\n[l'))
@@ -77,6 +78,7 @@ def test_a_person_at_the_terminal_is_asked_for_the_reading(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_ctrl_c_at_the_question_writes_nothing_and_says_one_line(tmp_path):
     (tmp_path / "bench.toml").write_text(BENCH)
     said, status = at_a_terminal([b"\x03"], tmp_path)

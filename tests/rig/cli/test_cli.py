@@ -65,6 +65,7 @@ def test_show_prints_a_table(command, recording):
     assert len(re.findall(r" (good|warned)$", out, re.MULTILINE)) == 2
 
 
+@pytest.mark.slow
 def test_a_recording_becomes_a_model_and_a_figure(command, recording, tmp_path):
     status, out, _ = command(f"identify {recording} -o model.h5 --json")
     assert status == 0

@@ -79,6 +79,7 @@ def driven(name):
     return False
 
 
+@pytest.mark.slow
 def test_a_run_is_stopped_from_another_process_and_the_status_says_that_it_is_at_0_v(command, running):
     child = running("run.h5")
     began = time.monotonic()
@@ -158,6 +159,7 @@ def alive(pid):
         return False
 
 
+@pytest.mark.slow
 def test_watching_in_plain_lines_begins_before_the_run_and_ends_with_it(command, running):
     watching = subprocess.Popen(
         [*RIG, "watch", "run.h5"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1
@@ -210,6 +212,7 @@ def on_a_terminal(*arguments):
     return child.wait(300), shown.decode(errors="replace")
 
 
+@pytest.mark.slow
 def test_a_run_on_a_terminal_says_how_to_watch_and_stop_it(command):
     _, shown = on_a_terminal("run", "magnet-beam/backbone-short", "-o", "run.h5")
     lines = [
@@ -219,6 +222,7 @@ def test_a_run_on_a_terminal_says_how_to_watch_and_stop_it(command):
     assert "rig watch" not in command("run magnet-beam/backbone-short -o again.h5").err
 
 
+@pytest.mark.slow
 def test_on_a_terminal_a_run_is_drawn_and_its_end_stays_to_be_read(running):
     running("run.h5")
     stopping = subprocess.Popen(

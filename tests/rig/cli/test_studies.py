@@ -11,7 +11,8 @@ from tests.studies.installed import entry_points as declared
 
 @pytest.fixture
 def without_studies(monkeypatch):
-    monkeypatch.setattr("rig.system.studies.entry_points", lambda **selected: ())
+    for module in ("rig.system.studies", "rig.cli.studies"):
+        monkeypatch.setattr(f"{module}.find_study", lambda _: None)
 
 
 def test_what_the_studies_declare_is_found_and_can_be_loaded():

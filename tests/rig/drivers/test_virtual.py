@@ -4,13 +4,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import rig
 from identification import nonlinear_mode
 from rig.bench import Bench
 from rig.conformance import with_loopback
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, DaqRefused
 from rig.loop.loop import Loop
+from tests.recorded import recorded_run
 from tests.refused import refused
 from tests.rig.rigs import bench_with, tick_for
 from tests.simulators.references import UNFILTERED
@@ -36,20 +36,27 @@ def skewed_bench(declared: float, real: float) -> Bench:
 
 
 def last_damping(bench: Bench) -> np.ndarray:
-    with rig.run("magnet-beam/backbone", bench=bench) as run:
+    with recorded_run("magnet-beam/backbone", bench) as run:
         assert run.complete
         return nonlinear_mode(run.backbone()).damping_ratio
 
 
 def measured(bench: Bench) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     """Points of a backbone, accepted or not, and what its part says of itself."""
-    with rig.run("magnet-beam/backbone", bench=bench) as run:
+    with recorded_run("magnet-beam/backbone", bench) as run:
         return list(run.recording.latest.values()), run.recording.parts[0].information["about"]
 
 
 def test_slow_bench_with_filters_reads_the_damping_of_a_fast_one() -> None:
     fast, slow = last_damping(bench_with()), last_damping(slow_bench(**SLOW_AND_FILTERED))
     assert slow == pytest.approx(fast, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_slow_loop_over_a_device_without_filters_reads_it_too_if_the_device_is_quicker() -> None:
+    slow = slow_bench(sample_rate_hz=6400.0).model_dump()
+    oversampled = Bench.model_validate(slow | {"oversample": 8})
+    assert last_damping(oversampled) == pytest.approx(last_damping(bench_with()), rel=2e-3)
 
 
 def test_slow_bench_without_filters_reads_it_wrong_and_says_by_how_much() -> None:

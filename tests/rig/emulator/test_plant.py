@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rig.drivers import make_daq
+from rig.drivers.virtual.kernels import Exchange
 from rig.emulator import VirtualPlant
 from rig.wire.messages import DeviceFlag
 from tests.rig.rigs import bench_with
@@ -53,6 +54,20 @@ def test_every_start_with_the_same_or_another_block_measures_the_same(readings_v
 def test_blocks_may_change_their_size_on_the_way(readings_v: np.ndarray) -> None:
     plant = VirtualPlant(bench_with(), SEED)
     np.testing.assert_array_equal(measured_v(plant, 1, 20, 3, 16), readings_v)
+
+
+def test_its_kernels_are_loaded_once_it_is_made(readings_v: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+    exchanged: list[int] = []
+
+    class Counting(Exchange):
+        def __call__(self, first: int, voltages: np.ndarray, *arrays: np.ndarray) -> None:
+            exchanged.append(voltages.size)
+            super().__call__(first, voltages, *arrays)
+
+    monkeypatch.setattr("rig.emulator.plant.Exchange", Counting)
+    plant = VirtualPlant(bench_with(), SEED)
+    assert exchanged == [1]
+    np.testing.assert_array_equal(measured_v(plant, 60), readings_v)
 
 
 def test_counts_that_were_handed_out_are_not_written_into_again() -> None:

@@ -90,6 +90,7 @@ def run_on(bench: Bench, plan: str, **changes: Any) -> tuple[list[str], dict[str
         return about["remarks"], about["queue"]
 
 
+@pytest.mark.slow
 def test_a_run_says_and_records_its_queue(emulator: Emulator) -> None:
     remarks, queue = run_on(emulator.bench, "magnet-beam/backbone", levels_v=(0.3923,), record_periods=5)
     assert queue["how"] == "measured"

@@ -91,6 +91,7 @@ def _runs(process):
         return False
 
 
+@pytest.mark.slow
 def test_the_latency_is_that_of_the_graph_and_of_the_cards_converters(lasting_card):
     rig = VirtualDAQ(card_bench(bench_with(), float(RATE_HZ))).rig
     said = _said(lasting_card, "latency")
@@ -122,6 +123,7 @@ def test_the_server_ends_with_a_card_that_is_killed(server):
             time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_server_that_ends_is_a_device_that_is_gone(card):
     host = _host(card, "zeros")
     first = host.stdout.readline()

@@ -71,6 +71,7 @@ def test_a_wire_has_neither_cables_nor_high_passes():
             EmulatorSettings.model_validate({"wire": "serial", "bench": bench_with(), field: value})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("corners_hz", [(2.0,), (10.0,), CORNERS_HZ])
 def test_phases_between_channels_are_right_after_a_calibration(monkeypatch, calibration, corners_hz):
     found, calibrated_bench = calibration(corners_hz)
@@ -90,6 +91,7 @@ def test_phases_between_channels_are_right_after_a_calibration(monkeypatch, cali
     assert latency == pytest.approx(PERIODS * PERIOD + 0.5 + filters, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_locked_test_through_high_passes_keeps_to_harmonic_balance(monkeypatch, calibration):
     _, bench = calibration(CORNERS_HZ)
     with sound_card(monkeypatch, bench_with(), CORNERS_HZ), rig.run(plan(), bench=bench, seed=5) as run:

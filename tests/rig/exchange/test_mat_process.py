@@ -72,6 +72,7 @@ json_like = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(json_like)
 def test_nested_values_come_back_as_they_were(tmp_path, value):

@@ -54,6 +54,7 @@ def dark(browser, yes):
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
 
+@pytest.mark.slow
 def test_all_panels_are_painted_and_points_are_told_with_unit_interval_and_quality(opened):
     page = opened("backbone")
     assert len(page.driver.find_elements("css selector", "main .uplot")) == 4

@@ -100,6 +100,7 @@ def test_files_over_one_another_have_their_names_and_qualities(recordings, tmp_p
     assert [entry["text"] for entry in found["legend"]][:2] == ["one", "other"]
 
 
+@pytest.mark.slow
 def test_every_kind_of_recording_has_a_figure_for_a_browser(recordings, tmp_path):
     for kind, path in recordings.items():
         plot(path, tmp_path / f"{kind}.html")

@@ -52,6 +52,7 @@ def test_a_late_reader_gets_every_line_and_every_bin(started):
     run.close()
 
 
+@pytest.mark.slow
 def test_lines_are_read_while_they_are_written(started):
     child = started(WRITER, "lines", 3000)
     run = LiveRun(folder_of(child))

@@ -203,6 +203,7 @@ class Watching(Silent):
         self.shown.append(shown_frame(self.run.frame(), self.run.facts, self.run.lines(0)))
 
 
+@pytest.mark.slow
 def test_the_states_of_a_run_come_one_after_the_other(tmp_path):
     watching = Watching()
     bench = bench_with({"block": 20})

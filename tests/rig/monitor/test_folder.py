@@ -71,6 +71,7 @@ def test_recordings_and_models_are_listed_and_nothing_else(inside, folder):
     assert found["run.h5"]["size"] == (folder / "run.h5").stat().st_size
 
 
+@pytest.mark.slow
 def test_each_has_its_figure_and_its_table(inside):
     for name, word in (("run.h5", "backbone of magnet beam"), ("model.h5", "nonlinear-mode")):
         n = listed(inside)[name]["n"]
@@ -82,6 +83,7 @@ def test_each_has_its_figure_and_its_table(inside):
         assert word in table.text
 
 
+@pytest.mark.slow
 def test_a_damaged_file_says_so_and_spoils_nothing(inside):
     n = listed(inside)["damaged <b>.h5"]["n"]
     for what in ("figure.png", "table.txt"):
@@ -114,6 +116,7 @@ def test_a_file_that_becomes_a_link_is_not_followed(inside, folder):
     assert inside.get(f"/folder/{n}/table.txt").status == 404
 
 
+@pytest.mark.slow
 def test_a_figure_is_made_once(inside, folder, monkeypatch):
     asked = []
 

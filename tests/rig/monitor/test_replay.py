@@ -63,6 +63,7 @@ def at(path, time_s):
     return replay
 
 
+@pytest.mark.slow
 def test_the_facts_are_those_of_the_run(watched):
     """But for what a run does not know when it is published: how it will be armed, and when its recording is begun."""
     path, _, _, facts = watched

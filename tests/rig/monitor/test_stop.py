@@ -45,6 +45,7 @@ def onward(answer):
     return found and found[1]
 
 
+@pytest.mark.slow
 def test_the_form_brings_a_run_to_0_v(tmp_path):
     """A virtual run by the clock, stopped by a form as a browser without scripts sends it, and followed to its end."""
     output = tmp_path / "run.h5"

@@ -194,6 +194,7 @@ def test_numbers_that_are_not_known_are_dashes_and_shares_are_words():
     assert [share_word(share) for share in (0.1, 0.8, 1.0, math.nan)] == ["ok", "close", "OVER", "-"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", ["magnet-beam/multisine-1", "magnet-beam/stepped-sine-up"])
 def test_points_of_other_kinds_have_their_own_columns(plan, tmp_path):
     kind = watched_facts(load_plan(plan), load_bench("magnet-beam"), Path("run.h5"), {})

@@ -112,6 +112,7 @@ with JournalWriter.create(sys.argv[1], header()) as writer:
     assert together.tobytes() == rows(0, n + 1000).tobytes()
 
 
+@pytest.mark.slow
 @posix
 def test_a_conversion_on_a_full_disk_leaves_journal_and_old_file_at_any_moment(tmp_path):
     output = tmp_path / "OUT.h5"

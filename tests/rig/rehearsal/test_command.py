@@ -18,6 +18,7 @@ def folder(command, tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_rehearsal_its_figure_its_page_and_its_comparison(command, folder):
     told = command("rehearse plan.toml --exact -n 3 -o r.h5 --figure r.png --jobs 1").succeeded()
     assert "ends well       100 %" in told.out
@@ -34,6 +35,7 @@ def test_a_rehearsal_its_figure_its_page_and_its_comparison(command, folder):
     assert "columns: per cent" in command("rehearse r.h5 --compare run.h5").succeeded().out
 
 
+@pytest.mark.slow
 def test_a_twin_is_written_and_an_improved_plan_too(command):
     Path("hasty.toml").write_text(
         SHORT_TEXT.replace("record_periods = 8", "record_periods = 8\nsettle.longest_periods = 40")

@@ -12,11 +12,12 @@ from tests.rig.rehearsal.plans import SHORT_TEXT
 from tests.waiting import LONG_S, wait_until
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGTERM for a group of processes")
 def test_sigterm_ends_it_in_a_line_and_leaves_no_worker(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text(SHORT_TEXT)
     command = [sys.executable, "-c", "from rig.cli import main; main()", "rehearse", "short.toml", "--exact"]
-    command += ["-n", "1000", "--jobs", "2", "-o", "r.h5"]
+    command += ["-n", "100", "--jobs", "2", "-o", "r.h5"]
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:

@@ -86,6 +86,7 @@ def test_parameters_are_recovered_within_their_standard_errors():
     assert found.std("frequency_hz") < 1e-4 < found.std("moving_mass_kg") < 0.5
 
 
+@pytest.mark.slow
 def test_stated_intervals_cover_the_truth_over_many_noises():
     inside = {"frequency_hz": 0, "damping_ratio": 0, "drive_shape": 0, "moving_mass_kg": 0}
     rig, n = rig_of(TRUE), 16
@@ -96,6 +97,7 @@ def test_stated_intervals_cover_the_truth_over_many_noises():
     assert all(count >= 0.75 * n for count in inside.values()), inside
 
 
+@pytest.mark.slow
 def test_what_a_narrow_band_does_not_determine_stays_as_wide_as_before():
     narrow = posterior(("tip",), START, {}, responses_of(rig_of(TRUE), np.linspace(23.0, 25.0, 200), 0.001))
     wide = posterior(("tip",), START, {}, responses_of(rig_of(TRUE), LINES, 0.001))

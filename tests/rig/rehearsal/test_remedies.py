@@ -45,6 +45,7 @@ def test_a_plan_without_patience_is_given_some():
     assert found.plan.settle.longest_periods == 120.0
 
 
+@pytest.mark.slow
 def test_a_window_that_is_too_narrow_is_widened():
     hypotheses = CALM.model_copy(update={"hardening": 1.0, "shift": (0.02, 0.04)})
     narrow = spoilt(controller={"frequency_window_hz": [23.9, 24.6]}, levels_v=[0.4, 2.0])
@@ -54,6 +55,7 @@ def test_a_window_that_is_too_narrow_is_widened():
     assert low < 23.9 < 24.6 < high
 
 
+@pytest.mark.slow
 def test_a_level_that_trips_is_left_out():
     bench = magnet_beam()
     bench = bench.model_copy(update={"limits": bench.limits.model_copy(update={"displacement_m": 6e-4})})

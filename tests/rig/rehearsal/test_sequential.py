@@ -6,9 +6,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rig.rehearsal.rehearsal import Rehearsal
+from rig.bench import load_bench
+from rig.campaigns.plans import load_plan
+from rig.rehearsal import rehearsal
+from rig.rehearsal.rehearsal import Rehearsal, RehearsalRequest, rehearse
 from rig.rehearsal.report import lines, summary
-from rig.rehearsal.sequential import BADLY, ERROR, WELL, interval, is_certain, unbiased
+from rig.rehearsal.sequential import BADLY, ERROR, WELL, fewest_further, interval, is_certain, unbiased
 from rig.rehearsal.verdict import verdict_of
 from tests.rig.rehearsal.test_verdict import FACTS, draw_of
 
@@ -47,6 +50,36 @@ def test_the_wrong_end_is_as_rare_as_stated(p, wrong):
 def test_a_plan_that_always_or_never_ends_well_is_told_after_few_draws():
     assert next(n for n in range(1, 100) if is_certain(n, n)) == 27
     assert next(n for n in range(1, 100) if is_certain(0, n)) == 3
+
+
+@pytest.mark.parametrize(
+    ("badly", "begun"),
+    [((), [27]), ((4,), [27, 11]), ((4, 30), [27, 11, 2]), (range(40), [27]), ((0, 1, 26), [27, 13])],
+)
+def test_no_more_twins_are_begun_than_the_verdict_needs_if_all_of_them_end_well(monkeypatch, badly, begun):
+    handed = []
+
+    def ensemble(variants, request, *, n_jobs=None):
+        handed.append(len(variants))
+        for name, number in variants.items():
+            yield name, draw_of(number, **({"end": "TRIP"} if number in badly else {}))
+
+    monkeypatch.setattr(rehearsal, "ensemble", ensemble)
+    request = RehearsalRequest(plan=load_plan("magnet-beam/backbone"), bench=load_bench("magnet-beam"), draws=40)
+    found = rehearse(request, until_certain=True)
+    assert handed == begun
+    assert [draw.number for draw in found.draws] == list(range(len(found.draws)))
+    ended = len(found.draws)
+    well = sum(draw.trial.completed for draw in found.draws)
+    assert is_certain(well, ended) or ended == 40
+    assert ended == 40 or not is_certain(sum(draw.trial.completed for draw in found.draws[:-1]), ended - 1)
+
+
+@pytest.mark.parametrize(("well", "of"), [(0, 0), (20, 21), (40, 44)])
+def test_fewer_further_draws_do_not_end_the_test(well, of):
+    more = fewest_further(well, of)
+    assert is_certain(well + more, of + more)
+    assert not is_certain(well + more - 1, of + more - 1)
 
 
 def test_the_page_says_how_many_draws_there_might_have_been():

@@ -56,6 +56,7 @@ def test_faults_of_the_device_are_those_that_are_supposed():
     assert {name: rate for name, rate in options["faults"].items() if rate} == faults
 
 
+@pytest.mark.slow
 def test_properties_come_as_often_as_they_are_probable():
     drawn = [draw(n).unknowns for n in range(200)]
     share = {name: np.mean([one[name] != 0.0 for one in drawn]) for name in ("shift", "joint_shift", "stop_gap")}

@@ -14,6 +14,7 @@ from rig.report.report import write_report
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
 from rig.text.console import PrintedTable, collected
+from tests.forking import FORKED
 from tests.rig.report.conftest import HOSTILE, short
 from tests.rig.report.page import read
 
@@ -92,7 +93,7 @@ def test_what_was_refused_stands_there_with_its_reason(tmp_path):
 
 def test_a_run_that_was_cut_short_is_reported_from_its_journal(tmp_path):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    subprocess.run([sys.executable, "-c", KILLED], check=False, cwd=tmp_path, env=environment)
+    subprocess.run([sys.executable, "-c", FORKED + KILLED], check=False, cwd=tmp_path, env=environment)
     path = tmp_path / "cut.h5"
     assert journal_path(path).exists()
     assert not path.exists()
@@ -102,6 +103,7 @@ def test_a_run_that_was_cut_short_is_reported_from_its_journal(tmp_path):
     assert any(row[0] == journal_path(path).name for row in page.rows() if row)
 
 
+@pytest.mark.slow
 def test_several_recordings_of_a_kind_are_compared_and_listed(recordings, hostile, tmp_path):
     write_report([recordings["sweep"], recordings["backbone"], hostile], tmp_path / "report.html")
     page = read(tmp_path / "report.html")

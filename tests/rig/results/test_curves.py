@@ -58,6 +58,7 @@ def joined(axis, colour):
     return points[np.isfinite(points).all(axis=1)]
 
 
+@pytest.mark.slow
 def test_predictions_are_lines_over_recordings_as_markers(files):
     page = drawn(files / "steady.h5", files / "other.h5", files / "stepped.h5")
     size, phase = page.axes

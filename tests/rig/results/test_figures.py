@@ -79,6 +79,7 @@ def test_without_harmonics_there_are_four_panels_and_none_is_empty(shelf):
     assert all(axis.has_data() for axis in page.axes)
 
 
+@pytest.mark.slow
 def test_references_can_be_told_from_curves_and_every_entry_is_there_once(predicted):
     page = page_of(draw_predictions, replace(predicted, sweeps=(), sweep_references=(), sweep_errors=()))
     texts = legend_of(page)

@@ -81,6 +81,7 @@ def test_a_contour_is_the_closed_form_and_is_compared_with_a_reference_at_every_
         assert any("leaving out every second level" in note for note in curve.notes)
 
 
+@pytest.mark.slow
 def test_surface_and_curves_are_drawn(made, command, tmp_path):
     command("predict surface.h5 --frequency-response 0.6 -o curves.h5")
     for name in ("surface", "curves"):

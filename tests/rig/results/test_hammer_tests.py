@@ -47,6 +47,7 @@ def hammer(folder, command, tmp_path):
     return command
 
 
+@pytest.mark.slow
 def test_a_mat_file_becomes_modes_with_figures(hammer, tmp_path):
     shown = json.loads((tmp_path / "imported.json").read_text())
     assert [bool(hit["fault"]) for hit in shown["hits"]] == [False] * 4 + [True]

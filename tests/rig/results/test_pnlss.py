@@ -65,6 +65,7 @@ def force_model(there, recordings) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_model_is_better_than_its_linear_start_on_data_that_were_held_out(there, force_model):
     told = json.loads(there("show F.h5 --json").out)
     assert (told["kind"], told["states"], told["sample_rate_hz"], told["outputs"]) == ("pnlss", 2, 800.0, ["drive"])
@@ -195,6 +196,7 @@ def test_with_the_voltage_as_input_sweeps_are_predicted_from_the_voltage(there, 
     assert any("of magnet-beam alone" in n for n in json.loads(there("show V.h5 --json").out)["notes"])
 
 
+@pytest.mark.slow
 def test_with_an_exciter_a_force_driven_model_follows_the_voltage(there, force_model, shelf):
     line = (
         f"predict F.h5 --sweep sweep.h5 --planned-sweep {SWEEP_PLAN} --exciter {shelf}/EX.h5 -o C.h5 --overwrite --json"

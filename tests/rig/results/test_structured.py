@@ -53,6 +53,7 @@ def there(command, recordings, monkeypatch):
     return command
 
 
+@pytest.mark.slow
 def test_a_model_becomes_a_rig_like_the_bench_of_its_recording(there, recordings):
     there("new rig --from S.h5 --bench lines.h5 -o mine.toml")
     there("new rig --from S.h5 --bench magnet-beam -o other.toml")
@@ -244,6 +245,7 @@ def test_multisines_have_the_errors_of_the_file(there):
     assert all(run["range_use"] < 0.2 for run in fresh)
 
 
+@pytest.mark.slow
 def test_every_recording_has_shifts_of_its_own(there, recordings):
     (recordings / "restless.toml").write_text('base = "magnet-beam"\n[driver.options.scatter]\nfrequency = 0.001\n')
     for seed in (2, 3):

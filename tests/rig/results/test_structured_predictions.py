@@ -49,6 +49,7 @@ def told(command, model, monkeypatch):
     return typed
 
 
+@pytest.mark.slow
 def test_peaks_at_a_constant_force_are_those_of_the_rig(told):
     truth = VirtualRig.shipped("magnet-beam")
     (sine,) = told("--frequency-response 0.13")["frequency_responses"]
@@ -107,6 +108,7 @@ def test_recorded_sweeps_are_followed_from_the_force_and_from_the_voltage(told):
         assert error["envelope_error"] < 0.005
 
 
+@pytest.mark.slow
 def test_a_planned_sweep_is_that_which_is_recorded_later(told):
     both = told("--planned-sweep ahead.toml --sweep ahead.h5 --exciter EX.h5")["sweeps"]
     assert both[0]["peak_m"] == pytest.approx(both[1]["peak_m"], rel=0.02)
@@ -118,6 +120,7 @@ def test_responses_to_a_voltage_and_references_are_answered(told):
     assert abs(found[1]["error"]["peak_error"]) < 0.005
 
 
+@pytest.mark.slow
 def test_figures_are_drawn_and_other_responses_refused(told, command, model, monkeypatch):
     told("--frequency-response 0.05 --sweep ahead.h5 --multisine lines.h5")
     monkeypatch.chdir(model.parent)
@@ -126,6 +129,7 @@ def test_figures_are_drawn_and_other_responses_refused(told, command, model, mon
     assert "elements reach" in said
 
 
+@pytest.mark.slow
 def test_beyond_twice_the_training_a_response_and_a_planned_sweep_are_refused(command, model, monkeypatch):
     monkeypatch.chdir(model.parent)
     loud = (model.parent / "ahead.toml").read_text().replace("[0.3]", "[6.0]")
@@ -145,6 +149,7 @@ def test_the_band_of_a_planned_sweep_holds_that_which_is_recorded_later(told):
     assert high_m < 1.2 * low_m
 
 
+@pytest.mark.slow
 def test_its_backbone_lies_on_that_which_is_measured(model, command, monkeypatch):
     from identification import structured_mode
     from rig.results.files import load

@@ -137,6 +137,7 @@ def test_a_terminal_prints_the_table_instead_of_arrays(mode):
     }
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_table_and_figure(tmp_path):
     nbclient = pytest.importorskip("nbclient", reason="nbclient is not installed (pip install 'vibrolock[dev]')")
     nbformat = pytest.importorskip("nbformat", reason="nbformat is not installed (pip install 'vibrolock[dev]')")

@@ -15,6 +15,7 @@ from rig.tick.tick import Tick, TickSettings
 from tests.refused import refused
 from tests.rig.rigs import bench_with
 from tests.rig.tick.blocks import nothing_told
+from vibrolock.compiled import bound
 
 HELD = [Segment(SegmentKind.RAMP, -1, 0.5, 2.0), Segment(SegmentKind.HOLD, -1, 0.5, 1000.0)]
 
@@ -37,13 +38,13 @@ def _wired(delay_whole, delay_fraction, samples=20_000, bench=None, skew=(0.0, 0
     estimates = np.zeros(samples, complex)
     out, volts = np.zeros(1), np.zeros((1, 4))
     scale = [channel.sensitivity_v_per_unit for channel in bench.channels]
+    flags, told = np.zeros(1, np.uint16), nothing_told(1)
+    block = bound(tick_block, tick.arrays, volts, flags, readings[:1], rows[:1], out, *told)
     for k in range(samples):
         phase = [omega * dt * (k - delay_whole - delay_fraction - s) for s in skew]
         volts[0, 0] = scale[0] * math.cos(phase[0])
         volts[0, 1:] = scale[1] * math.cos(phase[1] + math.pi / 2)
-        tick_block(
-            tick.arrays, volts, np.zeros(1, np.uint16), readings[k : k + 1], rows[k : k + 1], out, *nothing_told(1)
-        )
+        block(tick.arrays, volts, flags, readings[k : k + 1], rows[k : k + 1], out, *told)
         estimates[k] = tick.arrays.control["vibration"]["force"][0]
     return estimates, rows
 

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from rig.campaigns.evaluation.acceptance import nonharmonic_objection
-from rig.tuning.converter_bits import bits_force_n, periodic_beyond, rounding
+from rig.campaigns.evaluation.nonharmonic_force import HIGHEST_ORDER
+from rig.tuning.converter_bits import OutputBits, output_bits, periodic_beyond, rounding
+from rig.tuning.levels import lowest_force
 from tests.rig.rigs import bench_with
+from tests.rig.tuning.tuned import tuned_once
 
 RNG = np.random.default_rng(4)
 
@@ -40,9 +43,31 @@ def test_the_output_s_error_reaches_the_force_by_the_responses():
     frequency = np.linspace(10.0, 60.0, 501)
     flat = SimpleNamespace(frequency_hz=frequency, value=np.full((501, 2, 1), 4.0 + 0.0j))
     inside = 4.0 * bench.output_bit_v / math.sqrt(12.0) * math.sqrt(50.0 / (0.5 * bench.sample_rate_hz))
-    assert bits_force_n(bench, flat, 0.0) == pytest.approx(inside, rel=1e-3)
+    assert output_bits(bench, flat, 0.0).plain_n == pytest.approx(inside, rel=1e-3)
     whole = 4.0 * bench.output_bit_v / math.sqrt(12.0)
-    assert bits_force_n(bench, flat, math.inf) == pytest.approx(whole, rel=1e-3)
+    assert output_bits(bench, flat, math.inf).plain_n == pytest.approx(whole, rel=1e-3)
+
+
+def test_an_error_that_is_fed_back_reaches_the_force_as_its_spectrum_says():
+    """Against a rounded sine, sample by sample, up to the highest line that counts."""
+    bench = bench_with()
+    frequency = np.linspace(10.0, 60.0, 501)
+    flat = SimpleNamespace(frequency_hz=frequency, value=np.full((501, 2, 1), 4.0 + 0.0j))
+    n, rate_hz, bit = 2**18, bench.sample_rate_hz, bench.output_bit_v
+    sine = 700.3 * bit * np.sin(2.0 * np.pi * 24.3217 * np.arange(n) / rate_hz)
+    error, errors = 0.0, np.empty(n)
+    for k, value in enumerate(sine):
+        rounded = bit * math.floor((value + error) / bit + 0.5)
+        error += value - rounded
+        errors[k] = rounded - value
+    at_hz, power = np.fft.rfftfreq(n, 1.0 / rate_hz), 2.0 * np.abs(np.fft.rfft(errors)) ** 2 / n**2
+    inside = 4.0 * math.sqrt(power[(at_hz > 10.0) & (at_hz < 60.0)].sum())
+    counted = 4.0 * math.sqrt(power[at_hz < HIGHEST_ORDER * bench.specimen.linear_frequency_hz].sum())
+    assert output_bits(bench, flat, 0.0).shaped_n == pytest.approx(inside, rel=0.3)
+    assert (
+        0.8 * counted < output_bits(bench, flat, math.inf).shaped_n < 3.0 * counted
+    )  # a bound: all of it as at the end
+    assert inside < 0.2 * output_bits(bench, flat, 0.0).plain_n
 
 
 def test_the_least_bit_is_that_of_16_bit_where_the_bench_names_none():
@@ -62,3 +87,20 @@ def test_an_objection_names_the_output_s_bits_where_they_are_few():
     assert "12 steps of its converter" in nonharmonic_objection(0.2, 0.1, 12.0)
     assert "steps" not in nonharmonic_objection(0.2, 0.1, 5000.0)
     assert nonharmonic_objection(0.05, 0.1, 12.0) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("changes", "shaped"),
+    [
+        ({}, True),
+        ({"driver": {"name": "serial", "options": {"port": "/dev/null"}}}, False),
+        ({"driver": {"name": "serial", "options": {"port": "/dev/null"}}, "output_resolution_v": 1e-3}, True),
+    ],
+)
+def test_rounding_is_fed_back_where_it_bounds_the_force_and_the_bits_are_known(changes, shaped):
+    plant = tuned_once("magnet-beam").plant
+    large = OutputBits(plain_n=0.02, shaped_n=0.001)
+    found = lowest_force(bench_with(changes), plant, 1e-3, large)
+    assert found.noise_shaping == shaped
+    assert not lowest_force(bench_with(changes), plant, 1e-3, OutputBits(0.0, 0.0)).noise_shaping

@@ -35,6 +35,7 @@ def tip_ratio() -> float:
     return abs(float(rig.shape("acc_magnet") @ shape) / float(rig.shape("drive") @ shape))
 
 
+@pytest.mark.slow
 def test_the_ratio_of_the_tip_to_the_drive_point_is_measured(tuned):
     assert tuned.response_ratios["acc_magnet"] == pytest.approx(tip_ratio(), rel=0.01)
     assert tuned.plan.plant.response_ratios == pytest.approx(tuned.response_ratios, rel=1e-4)

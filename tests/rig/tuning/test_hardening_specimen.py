@@ -118,7 +118,7 @@ def test_ramps_keep_the_phase_because_the_frequency_follows_the_points_before(be
     (errors, periods), (without, waiting) = found
     assert plan.controller.frequency_feed_forward
     assert max(errors) < 10.0
-    assert max(without) > 15.0  # they ran into their own lag, and waited
+    assert max(without[1:]) > 2.0 * max(errors[1:])  # from the second ramp on there are points before
     assert periods < waiting
 
 
@@ -152,8 +152,9 @@ def test_a_backbone_steeper_than_the_gains_bear_ends_in_order_below_its_top(stee
 
 
 @pytest.mark.slow
-def test_without_the_bound_the_same_run_trips(steep):
+def test_without_the_bound_the_same_run_goes_where_it_cannot_be_held(steep):
     bench, plan = steep
     unbounded = plan.controller.model_copy(update={"steepest_backbone": None})
     with rig.run(plan.model_copy(update={"controller": unbounded}), bench=bench, seed=1) as run:
-        assert run.recording.parts[-1].end["tripped"]
+        qualities = [point["quality"] for point in run.recording.points]
+        assert run.recording.parts[-1].end["tripped"] or "lost-lock" in qualities

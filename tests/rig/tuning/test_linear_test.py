@@ -80,7 +80,24 @@ def test_a_level_that_trips_at_a_limit_is_lowered_once(monkeypatch):
     assert played == [0.01, 0.0025]
 
 
-@pytest.mark.parametrize("reason", ["sensor_stuck", "stop_requested", "daq_timeout"])
+def test_a_level_at_which_too_little_is_read_is_raised_once(monkeypatch):
+    runs = _Runs(SimpleNamespace(bench=bench_with()), "magnet-beam", None)
+    monkeypatch.setattr(runs, "at", lambda level_rms_v, *_: _ended_well(_ended("sensor_stuck"), level_rms_v))
+    assert SEARCH.next_level(0.01, runs.search_at(0.01)) == pytest.approx(0.01 / AFTER_TRIP)
+    with pytest.raises(TuningError, match=r"0\.04 V RMS: it tripped"):
+        runs.search_at(0.04)
+
+
+@pytest.mark.parametrize("known", [{"share_of_limits": 0.4}, {"tripped": "force above its limit"}])
+def test_a_level_that_may_be_near_a_limit_is_not_raised(monkeypatch, known):
+    runs = _Runs(SimpleNamespace(bench=bench_with()), "magnet-beam", None)
+    vars(runs).update(known)
+    monkeypatch.setattr(runs, "at", lambda level_rms_v, *_: _ended_well(_ended("sensor_stuck"), level_rms_v))
+    with pytest.raises(TuningError, match=r"0\.01 V RMS: it tripped"):
+        runs.search_at(0.01)
+
+
+@pytest.mark.parametrize("reason", ["stop_requested", "daq_timeout"])
 def test_what_else_ends_a_multisine_ends_the_tuning(monkeypatch, reason):
     runs = _Runs(SimpleNamespace(bench=bench_with()), "magnet-beam", None)
     monkeypatch.setattr(runs, "at", lambda level_rms_v, *_: _ended_well(_ended(reason), level_rms_v))

@@ -9,7 +9,7 @@ import pytest
 
 from identification import Channel, FrequencyResponseMatrix
 from rig.drivers import make_daq
-from rig.tuning.plant import channel_ratios, plant_of
+from rig.tuning.plant import channel_ratios, plant_of, smoothed_std
 from simulators.analysis import frequency_response
 from tests.rig.rigs import bench_with
 
@@ -88,3 +88,13 @@ def test_a_response_that_stands_off_a_real_mode_shape_is_measured(turn_deg, told
     turned = matrix.value * np.exp(1j * np.radians([0.0, 0.0, turn_deg]))[None, :, None]
     found = channel_ratios(replace(matrix, value=turned), plant).turns_deg
     assert found == ({} if told is None else {"acc_magnet": pytest.approx(told, abs=0.1)})
+
+
+def test_the_standard_error_of_a_line_is_pooled_with_those_beside_it_and_no_line_of_few_periods_decides():
+    few = np.sqrt(np.random.default_rng(0).chisquare(2, (400, 2)) / 2.0)
+    assert np.min(few) < 0.1
+    pooled = smoothed_std(few)
+    assert pooled.shape == few.shape
+    assert np.all((pooled > 0.5) & (pooled < 1.6))
+    for lines in (0, 1, 5, 30):
+        np.testing.assert_allclose(smoothed_std(np.full((lines, 2), 0.3)), np.full((lines, 2), 0.3))

@@ -46,11 +46,13 @@ def coupled_pole_of(virtual, near_hz):
     return complex(poles[np.argmin(np.abs(poles - 2j * np.pi * near_hz))])
 
 
+@pytest.mark.slow
 def test_the_structure_is_found_as_it_was_made(tuned):
     mode = VirtualRig.shipped(tuned.bench.name).linear_modes
     truth = int(np.argmin(np.abs(mode.frequency_hz - tuned.bench.specimen.linear_frequency_hz)))
     assert tuned.plant.frequency_rad_s / (2 * math.pi) == pytest.approx(mode.frequency_hz[truth], rel=2e-4)
-    assert tuned.plant.damping_ratio == pytest.approx(mode.damping_ratio[truth], rel=0.03)
+    # at the level of the multisine the joint's damping is 2.5 % higher; a seed scatters by 0.6 %
+    assert tuned.plant.damping_ratio == pytest.approx(mode.damping_ratio[truth], rel=0.045)
     assert tuned.plant.drive_shape == pytest.approx(tuned.bench.specimen.drive_mode_shape, rel=2e-3)
 
 
@@ -109,6 +111,7 @@ def test_a_wrong_mode_shape_of_the_bench_is_said_and_not_used(magnet):
     assert magnet.plan.controller.drive_mode_shape == pytest.approx(0.908466, rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.7, 1.3])
 def test_a_linear_frequency_that_is_30_percent_off_is_refused_with_the_measured_one(factor, tmp_path):
     wrong = bench_with({"specimen": {"linear_frequency_hz": factor * 24.37}})
@@ -152,6 +155,7 @@ def test_a_sensor_that_shows_noise_alone_is_named(tmp_path):
         tune(Bench.model_validate(table), tmp_path / "test.h5", TuningRequest(level_rms_v=0.05))
 
 
+@pytest.mark.slow
 def test_a_sensor_that_is_mounted_the_other_way_round_is_told(tmp_path):
     table = bench_with().model_dump()
     table["channels"] = [
@@ -164,6 +168,7 @@ def test_a_sensor_that_is_mounted_the_other_way_round_is_told(tmp_path):
         tune(Bench.model_validate(table), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02))
 
 
+@pytest.mark.slow
 def test_a_delay_that_no_gains_bear_makes_a_rig_unsuited_and_the_numbers_are_said(tmp_path):
     bench = bench_with(name="friction-beam", delay_samples=1000)
     with refused(TuningError, "unsuited-sets-of-gains-tried-max"):
@@ -233,6 +238,7 @@ def test_other_levels_are_those_that_limits_noise_and_distortion_allow(magnet, s
     assert test.other_levels_v == pytest.approx(levels)
 
 
+@pytest.mark.slow
 def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):
     tuned = tune("magnet-beam", tmp_path / "test.h5", TuningRequest(level_rms_v=0.05, to_m=0.0037, points=3))
     assert [note for note in tuned.notes if "damping rises beyond 1.7" in note]
@@ -262,6 +268,7 @@ def test_the_figure_names_what_a_test_engineer_looks_for(magnet):
     np.testing.assert_allclose(measured.get_ydata(), np.abs(magnet.test.responses.value[:, 0, 0]))
 
 
+@pytest.mark.slow
 def test_a_remark_on_the_bench_is_made_once(magnet, tmp_path, monkeypatch):
     monkeypatch.setattr("rig.tuning.tuning.choose", lambda *_: magnet.chosen)  # gains do not matter
     said = []
@@ -276,6 +283,7 @@ def test_a_remark_on_the_bench_is_made_once(magnet, tmp_path, monkeypatch):
     assert "drive_mode_shape = 0.7" in said[0]
 
 
+@pytest.mark.slow
 def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(command, tmp_path):
     line = "tune --bench magnet-beam -o tuned.toml --level 0.02 --figure tuned.png --law phase --points 3 --rehearse 2"
     told = json.loads(command(f"{line} --json").succeeded().out)

@@ -100,6 +100,7 @@ def test_bad_values_are_named(analysis: Callable[..., Any], arguments: dict[str,
         analysis(one_mode(), **arguments)
 
 
+@pytest.mark.slow
 def test_a_level_out_of_reach_is_named_and_the_points_before_it_are_kept() -> None:
     softening = one_mode(elements=[{"kind": "cubic", "at": "drive", "stiffness_n_m3": -3e8}])
     with refused(NotConvergedError, "force-n-lag-deg") as caught:

@@ -268,6 +268,7 @@ def test_a_users_function_that_cannot_work_is_refused(element: dict[str, Any], m
         User.model_validate({"kind": "user", "at": "magnet"} | element)
 
 
+@pytest.mark.slow
 def test_a_users_function_needs_no_compilation_of_the_plant_in_another_process(tmp_path: Path) -> None:
     (tmp_path / "my_springs.py").write_text(
         "import numba\n@numba.cfunc('float64(float64, CPointer(float64))')\ndef spring(z, p):\n    return -p[0] * z**3\n"

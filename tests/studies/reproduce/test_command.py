@@ -42,6 +42,7 @@ def results(folder):
     return json.loads((folder / "force" / "table.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_model_of_the_lowest_level_is_near_its_noise_at_its_own_level(results):
     (own,) = [row for row in results["errors"]["chosen on validation data"] if row["model"] is None]
     assert (own["training_set"], own["test"], own["runs"], own["unbounded_runs"]) == ("0.5 N", "same level", 1, 0)
@@ -58,6 +59,7 @@ def study_of(folder, **changes):
     return options, {"0.5 N": (path.stem, load(path).model)}
 
 
+@pytest.mark.slow
 def test_steady_peaks_within_the_range_are_those_of_the_rig(folder):
     options, models = study_of(folder, forces_n=(0.05,))
     truth = constant_force_response(VirtualRig.shipped("magnet-beam"), 0.05)
@@ -99,6 +101,7 @@ def test_models_know_which_realisations_they_were_identified_with_whatever_the_f
     assert uses == ["test", "validation", "training", "training", "training"]
 
 
+@pytest.mark.slow
 def test_figures_of_a_small_study_say_what_is_missing_and_why_curves_end(command, folder, monkeypatch):
     pages = {}
 

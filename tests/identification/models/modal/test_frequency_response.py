@@ -203,6 +203,7 @@ def test_a_stepped_test_with_recorded_force_jumps_at_the_fold_that_its_direction
     assert frequency[jump] == pytest.approx(upper if up else lower, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_test_at_constant_voltage_holds_states_that_are_unstable_under_its_force() -> None:
     """All states of a response at constant force, as if each had been held: no other rule could tell three of them apart."""
     mode = duffing(Q)

@@ -90,6 +90,7 @@ def recorded() -> Transient:
     return integrated()
 
 
+@pytest.mark.slow
 def test_the_coupled_prediction_follows_direct_time_integration(recorded: Transient) -> None:
     error = compare_sweep(predict_sweep(duffing(), recorded, exciter=EXCITER), recorded)
     assert abs(error.peak_error) < 2e-3
@@ -98,6 +99,7 @@ def test_the_coupled_prediction_follows_direct_time_integration(recorded: Transi
     assert 0.5 < error.range_use < 1.0
 
 
+@pytest.mark.slow
 def test_a_voltage_whose_phase_moves_is_followed_too() -> None:
     swinging = integrated(swing_rad=0.8)
     error = compare_sweep(predict_sweep(duffing(), swinging, exciter=EXCITER), swinging)

@@ -92,6 +92,7 @@ def test_an_unstable_linear_part_is_noted_with_its_frequency_and_growth() -> Non
     assert "rate of 7.96 1/s" in note  # 800 Hz times log 1.01
 
 
+@pytest.mark.slow
 def test_saturating_features_find_a_saturating_system() -> None:
     linear = linear_model(oscillator())
     weights = np.array([[0.6, 0.2, 0.0, 0.3]])
@@ -222,6 +223,7 @@ def test_an_unstable_start_is_reflected_and_fitted(monkeypatch: pytest.MonkeyPat
     assert any(unstable)
 
 
+@pytest.mark.slow
 def test_without_periodic_experiments_a_regression_or_a_given_linear_model_begins_the_fit() -> None:
     exact = hardening()
     record = measured(exact, multisine(0))

@@ -128,6 +128,7 @@ def test_dry_friction_does_no_work_on_the_structure_and_is_no_smaller_for_a_long
     assert np.max(np.abs(forces)) == 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [Coulomb(), Stribeck()])
 def test_dry_friction_is_found_without_a_place(law):
     """Two masses by Runge and Kutta with events; with the direction of one mode fits ended at 1 to 12 %."""

@@ -171,6 +171,7 @@ def test_an_element_at_a_channel_keeps_to_it(tested):
     assert free.training_error < 0.2 * found.training_error
 
 
+@pytest.mark.slow
 def test_derivatives_by_shapes_of_an_element_at_a_place(tested):
     """Against central differences of simulations."""
     from identification.models.structured.parameters import Parameters

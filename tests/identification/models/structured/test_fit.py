@@ -61,6 +61,7 @@ def test_a_known_model_comes_back():
     assert np.linalg.norm(outputs - true) < 1e-3 * np.linalg.norm(true)
 
 
+@pytest.mark.slow
 def test_the_static_force_that_no_sensor_shows_is_found():
     true = replace(TRUE, support_n_m=1500.0)
     data = [experiment(true, rms_n=rms) for rms in (1.0, 3.0)]
@@ -124,6 +125,7 @@ def test_noise_explains_the_residual_of_a_right_structure_and_not_of_a_wrong_one
     assert [one.force for one in found.missing[1:2]] == ([missing] if missing else [])
 
 
+@pytest.mark.slow
 def test_where_noise_does_not_explain_the_residual_the_fit_begins_again_elsewhere(monkeypatch):
     """The regression begins with a joint that slips at the largest displacement; the fit ends beside the truth, at 1.2 %."""
     laws = (PolynomialSpring((3.0,)), Iwan(count=8))

@@ -117,6 +117,7 @@ def numbers_of(model):
     )
 
 
+@pytest.mark.slow
 def test_the_run_tends_to_the_solution_of_the_equation_with_the_square_of_the_step():
     u = multisine(1.0, 2)[:, :300]
     errors = []

@@ -64,6 +64,7 @@ def test_the_exciters_part_is_taken_out_of_the_decay_of_the_magnet_beam(magnet):
     assert binomtest(held, len(inside), 0.93, alternative="less").pvalue > 0.01
 
 
+@pytest.mark.slow
 def test_the_friction_beam_decays_along_its_backbone_over_a_decade(friction):
     mode = decays(friction)[0].mode()
     _, damping, relative = against_harmonic_balance(mode, "friction-beam", 149.0)

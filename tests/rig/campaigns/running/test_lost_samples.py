@@ -15,7 +15,7 @@ from rig.errors import RecordingError
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
 from rig.loop.loop import Loop
-from rig.measurements import point_rows
+from rig.measurements import point_rows, sweeps
 from rig.tick.layout import SAMPLE_LOST, recorded_row
 from rig.tick.safety.layout import EndReason
 from tests.refused import refused
@@ -229,12 +229,15 @@ def test_windows_of_which_more_than_2_percent_are_lost_are_told():
     assert lost_objection(51, 1000) == "51 of 1000 samples were lost in transmission, allowed is up to 5%"
 
 
-def test_a_sweep_with_scattered_lost_samples_has_all_its_instants(monkeypatch):
+def test_a_sweep_with_scattered_lost_samples_has_all_its_instants_and_the_channels_that_are_wanted(monkeypatch):
     plan = SweepPlan.model_validate(
         {"bench": "magnet-beam", "start_hz": 22.0, "stop_hz": 27.0, "rate_hz_per_s": 2.0, "levels_v": [0.4]}
     )
     with rig.run(plan, seed=1) as run:
         sound = run.sweeps()[0]
+        two = sweeps(run.recording, roles=("force", "drive"))[0]
+    assert [channel.role for channel in two.channels] == ["force", "drive"]
+    np.testing.assert_allclose(two.fundamentals, sound.fundamentals[:2], rtol=1e-12)
     lose(monkeypatch, [(k, k + 1) for k in range(50, 100_000, 100)])
     with rig.run(plan, seed=1) as run:
         found, point = run.sweeps()[0], run.recording.points[0]

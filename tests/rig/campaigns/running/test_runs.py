@@ -113,6 +113,7 @@ def test_a_killed_run_keeps_its_rows_and_points_and_is_resumed_to_the_same_resul
     assert not journal_path(output).exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_ramps_down_closes_its_file_and_says_so(tmp_path, number):
     output = tmp_path / "run.h5"

@@ -9,6 +9,7 @@ from rig.bench import Bench
 from rig.daq import LOST
 from rig.drivers import make_daq
 from rig.drivers.sound import stream as streams
+from rig.drivers.sound.devices import found
 from rig.drivers.sound.lost_time import CALLS_IN_DOUBT
 from rig.drivers.sound.rates import PASS_BAND, Decimator, Interpolator, low_pass
 from rig.errors import (
@@ -480,6 +481,20 @@ def test_an_audio_server_that_has_no_time_is_asked_again_and_then_said_not_to_an
         return
     with refused(DaqTimeout, "does-not-answer-start-thread-error"):
         daq.open()
+
+
+@pytest.mark.parametrize(("unanswered", "is_found"), [(3, True), (4, False)])
+def test_a_device_that_is_not_listed_is_looked_for_again(card, monkeypatch, unanswered, is_found):
+    made, pauses = card(), []
+    monkeypatch.setattr("rig.drivers.sound.devices.time.sleep", pauses.append)
+    listed = [[]] * unanswered
+    every, made.query_devices = made.query_devices, lambda: listed.pop() if listed else every()
+    if is_found:
+        assert found("box", "").name == "box"
+    else:
+        with refused(DaqDisconnected, field="driver.options.device", value="box"):
+            found("box", "")
+    assert pauses == [0.5] * 3
 
 
 def test_a_missing_package_is_said_in_one_line(monkeypatch):

@@ -61,6 +61,7 @@ def typed(command, folder, monkeypatch):
     return lambda line: command(line).succeeded().out
 
 
+@pytest.mark.slow
 def test_a_foreign_mat_file_becomes_a_model_that_is_right_to_the_noise(typed):
     shown = typed("import measured.mat --mapping mapping.toml -o data.h5 --overwrite")
     assert "6 records at 512 Hz, periods of 512 samples" in shown

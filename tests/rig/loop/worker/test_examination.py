@@ -252,9 +252,10 @@ def test_a_latched_device_is_left_as_it_is(examined):
     assert all(daq.device.state is DeviceState.LATCHED for daq in examined.devices)
 
 
+@pytest.mark.slow
 def test_a_device_that_waits_for_the_host_needs_no_settings(examined):
     examined.keys |= {"lockstep": True, "simulated": 2}
-    facts = examine_device(BENCH, 0)
+    facts = examine_device(BENCH, 0, seconds=0.2)
     assert facts["recommendation"]["settings"] == {}
     assert "waits for the host" in facts["recommendation"]["reasons"]["queue_blocks"]
 

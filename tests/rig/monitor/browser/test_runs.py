@@ -72,6 +72,7 @@ def test_a_backbone_is_followed_to_its_last_point(browser, serve, begin, tmp_pat
             assert f" {point['frequency_hz']:.4f} " in row
 
 
+@pytest.mark.slow
 def test_a_run_by_the_clock_is_stopped_after_its_first_point(browser, serve, begin, tmp_path):
     recording = tmp_path / "stopped.h5"
     browser.open(serve(chosen(recording)))

@@ -199,6 +199,7 @@ def _fresh(plant=None, bench=None):
     return expected, plausibility
 
 
+@pytest.mark.slow
 @given(
     rate=st.floats(-5.0, 5.0),
     turn=st.floats(-10.0, 10.0),
@@ -232,6 +233,7 @@ def _of_second_order(part, omega, s):
     return here + (ahead - back) / (2.0 * step) * (s - at) - there
 
 
+@pytest.mark.slow
 @given(factor=st.floats(2.0, 50.0), periods=st.integers(1, 40))
 def test_the_output_of_a_held_level_at_most_doubles_within_a_period(factor, periods):
     expected, plausibility = _fresh()

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from controller import AmplitudeLaw, LockState
-from controller.kernels import LOCK, PERIOD, STEEP_PERIODS
+from controller import AmplitudeLaw, LockRule, LockState
+from controller.kernels import LOCK, MOST_LAG_SLOWING, PERIOD, STEEP_PERIODS, next_lock_state
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import guard_record
 from rig.tick.sequencer.judgement import SETTLING, forget_periods, judge_period
 from rig.tick.sequencer.kernels import NEAR_PERIODS, advance
 from rig.tick.sequencer.layout import PROGRESS, OnFailure, Outcome, SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule, segment_table
+from vibrolock.compiled import bound
 
 RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)
 
@@ -116,22 +117,24 @@ class Walk:
 
     def go(self, periods, per_period=50, unreached=False):
         self.progress["unreached"] = unreached
+        records = self.settling[0], RULE.build()[0], self.lock[0], self.guard[0]
+        given = (self.progress[0], self.table, self.outcomes, *records)
+        advanced = bound(advance, *given)
         for _ in range(int(periods * per_period)):
             self.progress["cycle"], self.progress["sample"] = self.cycle, self.sample
-            advance(
-                self.progress[0],
-                self.table,
-                self.outcomes,
-                self.settling[0],
-                RULE.build()[0],
-                self.lock[0],
-                self.guard[0],
-            )
+            advanced(*given)
             self.levels.append(float(self.progress["level"][0]))
             self.lags.append(float(self.progress["lag"][0]))
             self.cycle += 1.0 / per_period
             self.sample += 1
         return self
+
+    def go_to_the_next(self):
+        """Go on until the next segment has begun."""
+        segment = int(self.progress["segment"][0])
+        while self.progress["segment"][0] == segment:
+            self.go(0.02)
+        return self.go(0.02)
 
     def codes(self):
         return [Outcome(int(code)).name for code in self.outcomes["outcome"]]
@@ -219,6 +222,47 @@ def test_a_ramp_up_is_slower_in_proportion_to_its_phase_error():
     walk.lock["slowing"] = 0.75
     assert walk.go(40.9).codes() == ["DONE", "RUNNING"]
     assert walk.go(0.2).codes() == ["DONE", "DONE"]
+
+
+def _with_lag(walk, lag):
+    """Let the lag of the ramp under way be ``lag`` times the one from which it is slower, then none any more."""
+    thresholds = LockRule().build()[0]
+    for error_rad in (lag * 0.5 * thresholds["waiting_rad"], 0.0):
+        next_lock_state(walk.lock[0], thresholds, True, False, error_rad, True)
+    assert walk.lock["slowing"] == 0.0
+
+
+def test_a_ramp_up_stays_so_much_slower_that_its_lag_would_not_come_again():
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0)).go(6)
+    _with_lag(walk, 4.0)  # of half a ramp: what is left takes four times as long
+    assert walk.go(20.9 - 1.0).codes() == ["DONE", "RUNNING"]
+    assert walk.go(1.2).codes() == ["DONE", "DONE"]
+
+
+def test_the_next_ramp_up_begins_at_the_rate_that_the_lag_of_the_one_before_allows():
+    def rates(*lags):
+        walk = Walk(_held(1.0, 1.0), *(_ramp(3.0 + k, 10.0) for k in range(len(lags) + 1))).go(2)
+        for lag in lags:
+            _with_lag(walk, lag)
+            walk.go_to_the_next()
+        return 1.0 - float(walk.lock["lag_slowing"][0])
+
+    assert rates(1.0) == 1.0
+    assert rates(2.0) == pytest.approx(0.5)
+    assert rates(2.0, 0.8) == pytest.approx(0.5 / 0.8)
+    assert rates(2.0, 2.0) == pytest.approx(0.25)
+    assert rates(2.0, 0.4) == 1.0
+    assert rates(100.0) == pytest.approx(1.0 - MOST_LAG_SLOWING)
+
+
+@pytest.mark.parametrize("fault", ["held", "continued", "lost"])
+def test_a_lag_that_a_fault_of_the_device_has_made_slows_no_ramp(fault):
+    walk = Walk(_held(1.0, 1.0), _ramp(3.0, 10.0), _ramp(4.0, 10.0)).go(2)
+    walk.progress[fault] = 3
+    _with_lag(walk, 4.0)
+    walk.go_to_the_next()
+    assert walk.progress["slowed_cycles"][0] == 0.0
+    assert walk.lock["lag_slowing"][0] == 0.0
 
 
 def test_before_the_first_lock_no_ramp_waits_for_the_phase():

@@ -1,0 +1,69 @@
+"""Trials of a tuned plan, one after the other until its levels are held."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rig.arming.run_options import RunOptions
+from rig.tuning.levels import NARROWEST_SPAN, LevelChoice
+from rig.tuning.plant import TuningError
+from rig.tuning.trial import PlanTrial, carried_out
+from rig.tuning.tuning import Tuning
+
+TRIALS = 3  # of a plan whose levels change, at most; chosen
+
+
+def try_plan(tuning: Tuning, recording: str | Path, options: RunOptions | None = None) -> Tuning:
+    """Carry out the plan of a tuning, and return the tuning with the levels that were held.
+
+    The plan keeps the longest row of levels that were accepted with something to spare (`PlanTrial.held`), in as many steps. Of
+    what lies above them, as a backbone that becomes too steep, or below, as rounding, a linear test tells little. Where levels
+    span little and rounding disturbs some of them, larger ones are tried once; where the lowest were too large, lower ones. A
+    plan whose levels have changed is tried again, up to `TRIALS` times in all. The first trial is recorded in ``recording``,
+    others beside it (`trial_recordings`).
+
+    Raises `rig.tuning.plant.TuningError` if no range of levels was held, `rig.tuning.trial.TrialEndedError` if the run ended
+    for another reason, and the errors of `rig.run`.
+    """
+    options, paths = options or RunOptions(), trial_recordings(Path(recording))
+    tuning, found = _first_trial(tuning, paths[0], options)
+    trials = [found]
+    while (levels := _after(trials, tuning)) is not tuning.levels:
+        notes = tuple(note for note in tuning.notes if note not in tuning.level_notes)
+        tuning = replace(tuning, levels=levels, notes=notes)
+        if len(trials) == TRIALS:
+            break
+        if options.seed is not None:
+            options = replace(options, seed=options.seed + 1)
+        trials.append(carried_out(tuning.plan, tuning.bench, paths[len(trials)], options))
+    return replace(tuning, trials=tuple(trials))
+
+
+def _after(trials: Sequence[PlanTrial], tuning: Tuning) -> LevelChoice:
+    """Return the levels that the last trial held, or lower ones to be tried; a refusal says what bounds those of the plan."""
+    if len(trials) < TRIALS and (lower := trials[-1].lower_levels(tuning.levels)):
+        return lower
+    try:
+        return trials[-1].levels(tuning.levels)
+    except TuningError as refusal:
+        raise TuningError("; ".join((str(refusal), *tuning.level_notes))) from refusal
+
+
+def trial_recordings(first: Path) -> list[Path]:
+    """Return the files in which trials of a plan are recorded, in their order."""
+    return [first, *(first.with_name(f"{first.stem}-{number}{first.suffix}") for number in range(2, TRIALS + 1))]
+
+
+def _first_trial(tuning: Tuning, path: Path, options: RunOptions) -> tuple[Tuning, PlanTrial]:
+    """Carry out the plan, or the one of larger levels where these are better; return the tuning with this plan's levels."""
+    found = carried_out(tuning.plan, tuning.bench, path, options)
+    if tuning.larger is None or not found.is_disturbed or tuning.levels.span >= NARROWEST_SPAN:
+        return tuning, found
+    note = f"up to a third of the limits rounding disturbs the levels ({found.missing}); these are larger"
+    larger = replace(tuning, levels=tuning.larger, larger=None, notes=(*tuning.notes, note))
+    beside = path.with_name(f"{path.stem}-larger{path.suffix}")
+    again = carried_out(larger.plan, tuning.bench, beside, options)
+    if again.held_span(larger.levels) > found.held_span(tuning.levels):
+        return larger, replace(again, recording=beside.replace(path))
+    beside.unlink()
+    return tuning, found
