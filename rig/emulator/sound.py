@@ -41,6 +41,9 @@ SET_PARENT_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of <sys/prctl.h>."""
 START_S = 15.0
 """Longest wait for a server to answer, and to end, s."""
+ENDING, BETWEEN_STARTS_S = "server already active", 0.2
+"""Said by a server while another one has its name, as one does that was killed a moment ago and is not gone yet, or that is too
+busy to answer; and the time to the next attempt, s."""
 DECIMATION = 4
 """Frames of the card in a sample of the bench that reaches it: 12 kHz of 48 kHz."""
 LOOPBACK = Channel(name="loopback", role="monitor", unit="V", sensitivity_v_per_unit=1.0, range_v=10.0, loopback=True)
@@ -220,6 +223,24 @@ def _server(jack: Any) -> Iterator[None]:
     if program is None:
         raise DaqRefused("the program jackd is not installed; on Debian: apt install jackd2")
     command = [program, *_scheduling(), "-S", "-d", "dummy", "-r", str(RATE_HZ), "-p", str(PERIOD)]
+    until = time.monotonic() + START_S
+    while True:
+        with _running(command) as (server, last_lines):
+            if _answers_before(jack, server, until):
+                yield
+                return
+        said = "; ".join(line.strip() for line in last_lines)
+        if time.monotonic() > until:
+            raise DaqError(f"{' '.join(command)}: the server has not begun to answer within {START_S:g} s: {said}")
+        if ENDING not in said:
+            raise DaqError(f"{' '.join(command)}: the server has ended: {said}")
+        time.sleep(BETWEEN_STARTS_S)
+
+
+@contextmanager
+def _running(command: list[str]) -> Iterator[tuple["subprocess.Popen[str]", deque[str]]]:
+    """A process while the context lasts, and what it has written last; after the context nothing more comes."""
+    last_lines: deque[str] = deque(maxlen=3)
     server = subprocess.Popen(
         command,
         stdout=subprocess.DEVNULL,
@@ -230,20 +251,10 @@ def _server(jack: Any) -> Iterator[None]:
         preexec_fn=_end_with_parent if sys.platform == "linux" else None,
     )
     assert server.stderr is not None
-    last_lines: deque[str] = deque(maxlen=3)
     reading = threading.Thread(target=last_lines.extend, args=(server.stderr,), daemon=True)
     reading.start()
     try:
-        until = time.monotonic() + START_S
-        while not _answers(jack):
-            if server.poll() is not None:
-                reading.join(START_S)
-                said = "; ".join(line.strip() for line in last_lines)
-                raise DaqError(f"{' '.join(command)}: the server has ended: {said}")
-            if time.monotonic() > until:
-                raise DaqError(f"{' '.join(command)}: the server has not begun to answer within {START_S:g} s")
-            time.sleep(0.05)
-        yield
+        yield server, last_lines
     finally:
         server.send_signal(signal.SIGTERM)
         try:
@@ -251,6 +262,16 @@ def _server(jack: Any) -> Iterator[None]:
         except subprocess.TimeoutExpired:
             server.kill()
             server.wait()
+        reading.join(START_S)
+
+
+def _answers_before(jack: Any, server: "subprocess.Popen[str]", until: float) -> bool:
+    """Wait until a server answers; false once this one has ended, or at a time of the monotonic clock."""
+    while not _answers(jack):
+        if server.poll() is not None or time.monotonic() > until:
+            return False
+        time.sleep(0.05)
+    return True
 
 
 def _end_with_parent() -> None:

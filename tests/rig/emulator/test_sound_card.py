@@ -2,11 +2,11 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -19,7 +19,7 @@ from rig.emulator.emulated import Emulator, emulated
 from rig.emulator.sound import RATE_HZ, card_bench
 from rig.errors import DaqError
 from tests.rig.rigs import bench_with
-from tests.sound_server import own_sound_server
+from tests.sound_server import own_sound_server, servers
 
 PERIODS = 2
 """Of the graph: the output of one period is in the inputs of the second one after it."""
@@ -75,12 +75,8 @@ def _said(bench, what):
 
 def _server():
     """The process of this test's server."""
-    mine = f"JACK_DEFAULT_SERVER={os.environ['JACK_DEFAULT_SERVER']}".encode()
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if (process / "comm").read_text().strip() == "jackd" and mine in (process / "environ").read_bytes():
-                return int(process.name)
-    raise AssertionError("no server")
+    (server,) = servers(os.environ["JACK_DEFAULT_SERVER"])
+    return server
 
 
 def _runs(process):
@@ -111,6 +107,18 @@ def test_a_server_that_does_not_start_says_why(server, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     with pytest.raises(DaqError, match="the server has ended: Too many servers already active"):
         Emulator(bench_with(), "sound", lockstep=False).start()
+
+
+def test_a_server_whose_name_another_one_still_has_is_started_again(server, monkeypatch, tmp_path):
+    program, first = tmp_path / "jackd", tmp_path / "first"
+    first.touch()
+    real = shutil.which("jackd")
+    already = f"rm {first}; echo 'x server already active' >&2; echo Failed to open server >&2; exit 255"
+    program.write_text(f'#!/bin/sh\nif [ -e {first} ]; then {already}; fi\nexec {real} "$@"\n')
+    program.chmod(0o700)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    with Emulator(bench_with(), "sound", lockstep=False):
+        assert not first.exists()
 
 
 def test_the_server_ends_with_a_card_that_is_killed(server):
