@@ -67,8 +67,11 @@ class DrivenBalance(ABC):
         """float[n_states]: states under small constant inputs."""
 
     @abstractmethod
-    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
-        """complex[order]: multipliers of a disturbance while the phase advances by `angle`, with unchanged inputs."""
+    def multipliers(self, states: Float, inputs: Float, at: Period, frequency_hz: float) -> Complex:
+        """complex[order]: multipliers of a disturbance while the phase advances by `angle`, with unchanged inputs.
+
+        ``at`` is what `along` returns there.
+        """
 
     @abstractmethod
     def angle(self, frequency_hz: float) -> float:

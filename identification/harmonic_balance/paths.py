@@ -214,14 +214,14 @@ class Resonances:
         """float[n]: largest displacement of any element over its range."""
         return np.array([np.max(self.balance.state_use(z[:-1], self.balance.basis.to_time)) for z in self.unknowns])
 
-    def states(self) -> SteadyStates:
-        """Return the vibrations with their stability."""
+    def states(self, *, stability: bool = True) -> SteadyStates:
+        """Return the vibrations; without ``stability`` all count as stable."""
         balance, unknowns, at_hz = self.balance, self.unknowns[:, :-1], self.frequency_hz
         stable = [
-            statically_stable(balance, z, hz, of)
+            not stability or statically_stable(balance, z, hz, of)
             for z, hz, of in zip(unknowns, at_hz.tolist(), self.level, strict=True)
         ]
-        return steady_states(balance, unknowns, at_hz, np.array(stable), self.level)
+        return steady_states(balance, unknowns, at_hz, np.array(stable), self.level, stability=stability)
 
 
 class PhaseResonance:

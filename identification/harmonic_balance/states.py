@@ -144,11 +144,12 @@ def steady_states(
     fine = basis.at(2.0 * np.pi * np.arange(_FINE * harmonics) / (_FINE * harmonics))
     for k, (z, at_hz) in enumerate(zip(unknowns, frequency_hz.tolist(), strict=True)):
         states, inputs = balance.states(z), balance.inputs_of(z, levels[k])
-        parts = {"states": states, "inputs": inputs, "outputs": balance.along(states, inputs, at_hz).outputs}
+        at = balance.along(states, inputs, at_hz)
+        parts = {"states": states, "inputs": inputs, "outputs": at.outputs}
         for name, part in parts.items():
             series[name][k] = harmonics_of(part)
         use["states"][k], use["inputs"][k] = balance.state_use(z, fine), balance.input_use(inputs, fine)
-        multipliers = balance.multipliers(z, at_hz, levels[k]) if stability else None
+        multipliers = balance.multipliers(states, inputs, at, at_hz) if stability else None
         found[k] = np.nan if multipliers is None else multipliers
         losses.append(_loss(balance, multipliers, at_hz, bool(statically_stable[k])))
     return SteadyStates(

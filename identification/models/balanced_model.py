@@ -155,7 +155,7 @@ class BalancedModel(DynamicModel):
                 f"no periodic vibration was found at {at_hz:g} Hz and {request.level:g}", field="frequency_hz"
             )
         stable = np.array([statically_stable(balance, z, at_hz)])
-        return steady_states(balance, z[None], np.array([at_hz]), stable)
+        return steady_states(balance, z[None], np.array([at_hz]), stable, stability=request.stability)
 
     def backbone(self, request: SteadyRequest, near_hz: float | None) -> SteadyStates:
         """Follow phase resonance from 2 % of the level up to the level."""
@@ -163,7 +163,7 @@ class BalancedModel(DynamicModel):
         if found.reason:
             reached = found.level[-1] * request.level
             raise IdentificationError(f"force_n: the backbone ends at {reached:.3g} N ({found.reason})")
-        return found.states()
+        return found.states(stability=request.stability)
 
     def resonances(self, request: SteadyRequest, near_hz: float | None) -> Resonances:
         """Follow phase resonance as far as it goes, up to the level."""

@@ -39,7 +39,7 @@ class SteadyRequest:
     """A steady vibration under a constant excitation, as `identification.frequency_response` describes its parameters.
 
     ``level`` is in newtons, or in volts if ``held`` is ``voltage``. ``stability``: whether a harmonic balance finds the
-    multipliers of each vibration, which takes a third of the time; otherwise they are NaN, and only folds count as unstable.
+    multipliers of each vibration, which takes half of the time; otherwise they are NaN, and only folds count as unstable.
     """
 
     level: float

@@ -35,6 +35,7 @@ class StateOptions(TypedDict, total=False):
     harmonics: int
     samples: int | None
     largest_range_use: float
+    stability: bool
 
 
 class BackboneOptions(StateOptions, total=False):
@@ -100,6 +101,9 @@ def frequency_response(
     harmonics, samples
         For PNLSS and structured models: number of harmonics without the static one, reduced with a note if the sample rate
         has no room for them; and of samples of a period, by default enough that harmonics do not alias.
+    stability
+        For PNLSS and structured models: whether the multipliers of each vibration are found, which takes half of the time;
+        otherwise only what lies between the folds of a frequency response counts as unstable. True by default.
     points
         Largest number of points on a branch.
     largest_range_use

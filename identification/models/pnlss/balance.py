@@ -93,10 +93,10 @@ class PnlssBalance(DrivenBalance):
         model = self.model
         return np.asarray(np.linalg.lstsq(np.eye(model.states) - model.a, model.b @ inputs)[0])
 
-    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
+    def multipliers(self, states: Float, inputs: Float, at: Period, frequency_hz: float) -> Complex:
         """complex[n_states]: multipliers over one sample."""
         angle = self.angle(frequency_hz)
-        slope = self._evaluated(self.states(z), self.inputs_of(z, level))[2]
+        slope = self._evaluated(states, inputs)[2]
         states_by = self._derivative(slope[..., : self.n_states])
         return multipliers(states_by, self.basis.turned(angle)[0], self.basis, angle)
 

@@ -30,7 +30,7 @@ class PnlssDynamics(BalancedModel):
     """A polynomial nonlinear state-space model."""
 
     kind = "PNLSS model"
-    options = frozenset({"exciter", "held_inputs", "samples", "voltage_v", "band_hz"})
+    options = frozenset({"exciter", "held_inputs", "samples", "voltage_v", "band_hz", "stability"})
 
     def __init__(self, model: PnlssModel) -> None:
         self.driven = self.model = model

@@ -75,6 +75,19 @@ class StructuredBalance(DrivenBalance):
             [one[..., None] * shape for one, shape in zip(turned, model.output_shapes, strict=True)], axis=1
         )
         """Derivatives of the outputs' coefficients by those of the states at 1 rad/s [size, outputs, size, n]."""
+        b, one = model.input_shapes, np.eye(basis.size)
+        self._own_damping, self._stiffness = 2.0 * model.damping_ratio * model.omega, model.omega**2
+        self._twice = self._turning @ self._turning
+        self._by = np.zeros((3, basis.size, modes, basis.size, modes + b.shape[1]))
+        """Derivatives of the residual of small vibrations by (x, u), times powers 0 to 2 of the frequency in rad/s."""
+        for i in range(modes):
+            self._by[:, :, i, :, i] = self._stiffness[i] * one, self._own_damping[i] * self._turning, self._twice
+        for p in range(basis.size):
+            self._by[0, p, :, p, modes:] = -b
+        self._driven = np.outer(b[:, 0], b[:, 0])
+        self._outputs_by = np.zeros((basis.size, len(self.outputs), basis.size, modes + b.shape[1]))
+        for p in range(basis.size):
+            self._outputs_by[p, :, p, modes:] = model.direct
         shape = (self.ranges, basis.samples)
         self._work = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
         self._rows = np.empty((2, basis.size))
@@ -104,27 +117,23 @@ class StructuredBalance(DrivenBalance):
 
     def along(self, states: Float, inputs: Float, frequency_hz: float) -> Period:
         """Evaluate the model: the residual is the sum of all modal forces."""
-        model, basis, n, size = self.model, self.basis, self.n_states, self.basis.size
-        w, d, phi, b = 2.0 * np.pi * frequency_hz, self._turning, self._system.phi, model.input_shapes
+        model, basis, n = self.model, self.basis, self.n_states
+        w, phi, b = 2.0 * np.pi * frequency_hz, self._system.phi, model.input_shapes
         force, damping, by = self._elements(states, w)
         back = basis.to_coefficients
-        twice, own_damping = d @ d, 2.0 * model.damping_ratio * model.omega
-        residual = w**2 * twice @ states + w * (d @ states) * own_damping + states * model.omega**2
+        turned, twice = (self._turning @ states) * self._own_damping, self._twice @ states
+        residual = w**2 * twice + w * turned + states * self._stiffness
         residual += back @ force.T @ phi - inputs @ b.T
-        by_w = 2.0 * w * twice @ states + (d @ states) * own_damping
+        by_w = 2.0 * w * twice + turned
         by_w += back @ (damping.T * (self._to_rate @ states @ phi.T)) @ phi
 
-        residual_by = np.zeros((size, n, size, n + b.shape[1]))
+        residual_by = self._by[0] + w * self._by[1] + w**2 * self._by[2]
         linear = residual_by[..., :n]
         linear += self._between_modes(back @ by)
-        for i in range(n):
-            linear[:, i, :, i] += w**2 * twice + w * own_damping[i] * d + model.omega[i] ** 2 * np.eye(size)
-        for p in range(size):
-            residual_by[p, :, p, n:] = -b
         if model.support_n_m > 0.0:
             reaction, reaction_by, reaction_by_w = self._support(states @ b[:, 0], w)
             residual += reaction[:, None] * b[:, 0]
-            linear += np.einsum("pq,i,j->piqj", reaction_by, b[:, 0], b[:, 0])
+            linear += reaction_by[:, None, :, None] * self._driven[:, None, :]
             by_w += reaction_by_w[:, None] * b[:, 0]
 
         outputs, outputs_by, outputs_by_w = self._outputs(states, inputs, w)
@@ -150,11 +159,10 @@ class StructuredBalance(DrivenBalance):
         low_pass, slope = np.zeros((2, basis.size, basis.size))
         low_pass[0, 0] = self._mean_supported
         stage = np.asarray(1.0 / (1.0 + 1j * h * w / corner), dtype=np.complex128)
-        for k, (factor, by_w) in enumerate(
-            zip(complex_product(stage**2), complex_product(-2j * h / corner * stage**3), strict=True)
-        ):
-            here = slice(2 * k + 1, 2 * k + 3)
-            low_pass[here, here], slope[here, here] = factor, by_w
+        pairs = (2 * h - 1)[:, None] + np.arange(2)
+        blocks = pairs[:, :, None], pairs[:, None, :]
+        low_pass[blocks] = complex_product(stage**2)
+        slope[blocks] = complex_product(-2j * h / corner * stage**3)
         most = model.support_largest_n
         bounded = np.tanh(model.support_n_m / most * (basis.to_time @ low_pass @ displacement))
         stiffness = (basis.to_coefficients * (model.support_n_m * (1.0 - bounded**2))) @ basis.to_time
@@ -162,12 +170,10 @@ class StructuredBalance(DrivenBalance):
 
     def _outputs(self, states: Float, inputs: Float, w: float) -> tuple[Float, Float, Float]:
         """Coefficients of the outputs, and derivatives by those of (x, u) and by w."""
-        n = self.n_states
-        by = np.zeros((self.basis.size, len(self.outputs), self.basis.size, n + len(self.inputs)))
+        n, (size, count) = self.n_states, self._outputs_by.shape[:2]
+        by = self._outputs_by.copy()
         by[..., :n] = self._motions_by * w ** self._orders[:, None, None]
-        for p in range(self.basis.size):
-            by[p, :, p, n:] = self.model.direct
-        moved = np.tensordot(by[..., :n], states, axes=2)
+        moved = (by[..., :n].reshape(size * count, size * n) @ states.ravel()).reshape(size, count)
         return moved + inputs @ self.model.direct.T, by, moved * self._orders / w
 
     def _at_rest(self, frequency_hz: float) -> Period:
@@ -187,10 +193,10 @@ class StructuredBalance(DrivenBalance):
         by = self._at_rest(1.0).residual_by[0, :, 0]
         return np.asarray(np.linalg.solve(by[:, : self.n_states], -by[:, self.n_states :] @ inputs))
 
-    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
+    def multipliers(self, states: Float, inputs: Float, at: Period, frequency_hz: float) -> Complex:
         """complex[2 n_modes]: multipliers over a period."""
-        states, n, count, w = self.states(z), self.n_states, self.state_unknowns, 2.0 * np.pi * frequency_hz
-        stiffness = self.along(states, self.inputs_of(z, level), frequency_hz).residual_by[..., :n]
+        n, count, w = self.n_states, self.state_unknowns, 2.0 * np.pi * frequency_hz
+        stiffness = at.residual_by[..., :n]
         damping = self._elements(states, w)[1]
         parts = np.array([(self.basis.to_coefficients * row) @ self.basis.to_time for row in damping])
         own_damping = np.zeros((self.basis.size, n, self.basis.size, n))

@@ -32,7 +32,7 @@ class StructuredDynamics(BalancedModel):
     """A structured model, or a fit of one, which gives its covariance as well."""
 
     kind = "structured model"
-    options = frozenset({"exciter", "support", "samples", "voltage_v", "band_hz"})
+    options = frozenset({"exciter", "support", "samples", "voltage_v", "band_hz", "stability"})
     highest_hz = np.inf
 
     def __init__(self, found: StructuredModel | StructuredFit) -> None:

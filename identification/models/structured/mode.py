@@ -83,7 +83,7 @@ def structured_mode(
             f"the backbone ends at {path.level[-1] * force_n:.3g} N ({path.reason})", field="force_n"
         )
     path = path.some(np.unique(np.linspace(0, len(path.level) - 1, _POINTS).round().astype(int)))
-    states = path.states()
+    states = path.states(stability=False)
     at_rest, mode = _tested(model, near_hz)
     linear = at_rest.output_shapes[:, mode]
     shape = float(abs(linear[row]))

@@ -34,7 +34,7 @@ class BackboneCurve(NamedTuple):
     @classmethod
     def of(cls, path: Resonances) -> Self:
         """Return that of a path of resonances."""
-        states = path.states()
+        states = path.states(stability=False)
         drive = states.displacement_m[:, 1, 0]
         return cls(np.abs(states.force_n[:, 1]), np.asarray(path.frequency_hz), np.abs(drive))
 

@@ -26,6 +26,7 @@ class Fixed(TypedDict, total=False):
     exciter: Exciter | None
     held_inputs: Mapping[str, float]
     largest_range_use: float
+    stability: bool
 
 
 class Level(TypedDict, total=False):

@@ -127,15 +127,16 @@ def _band(
 ) -> ResponseBand | None:
     """Return the band of a response over other models; None if there are none, or if most have no such response."""
     responses: list[SteadyPrediction] = []
+    without: Fixed = {**fixed, "stability": False}  # which a band has no use for
     for model in others:
         with suppress(IdentificationError):
-            responses.append(frequency_response(model, **level, **fixed))
+            responses.append(frequency_response(model, **level, **without))
     if len(responses) <= len(others) // 2:
         return None
     band = band_of_responses(responses)
     if found.scatter is not None:
         return band
-    anywhere: Fixed = {**fixed, "largest_range_use": _ANYWHERE}
+    anywhere: Fixed = {**without, "largest_range_use": _ANYWHERE}
     return found.with_what_is_open(band, response, lambda model: frequency_response(model, **level, **anywhere))
 
 

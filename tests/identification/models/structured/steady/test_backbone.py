@@ -36,6 +36,17 @@ def test_a_point_of_the_backbone_is_a_vibration_under_its_force():
         np.testing.assert_allclose(alone.multipliers[0], found.multipliers[k], rtol=1e-5)
 
 
+def test_a_backbone_and_a_vibration_without_stability_are_the_same():
+    asked, other = (backbone(smooth(), 0.5, largest_range_use=3.0, stability=one) for one in (True, False))
+    np.testing.assert_array_equal(asked.outputs, other.outputs)
+    assert np.all(np.isnan(other.multipliers))
+    assert np.all(other.stable)
+    at_hz = float(asked.frequency_hz[-1])
+    asked, other = (steady_state(smooth(), at_hz, 0.5, largest_range_use=3.0, stability=one) for one in (True, False))
+    np.testing.assert_array_equal(asked.outputs, other.outputs)
+    assert np.all(np.isnan(other.multipliers))
+
+
 def test_damping_of_a_slider_is_that_of_its_loop():
     stiffness, slip, scale, direction = 0.15, 0.2, 1e-3, 0.9
     slider = NonlinearElement(
