@@ -30,6 +30,7 @@ import rig
 from benchmarks.random_rigs import compared, drawn, true_curve
 from rig.arming.run_options import RunOptions
 from rig.bench import load_bench
+from rig.campaigns.backbone.ramps import ramps_in
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.plans import load_plan
 from rig.errors import RigError
@@ -37,7 +38,6 @@ from rig.recording.reader import Recording
 from rig.rehearsal.knowledge import collect_knowledge
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.rehearsal.verdict import verdict_of
-from rig.tick.sequencer.layout import SegmentKind
 from rig.tuning import try_plan, tune
 
 KINDS = {"clearance": "stops", "jenkins": "joints", "iwan": "joints"}
@@ -115,23 +115,12 @@ def _run(bench: Any, plan: Any, path: Path, seed: int) -> dict[str, Any]:
             "text": end["text"],
             "tripped": bool(end["tripped"]),
             "well": bool(end["completed"]),
-            "ramps_deg": ramp_errors(part, plan.segments(bench.sample_rate_hz)),
+            "ramps_deg": [ramp.error_deg for ramp in ramps_in(part, plan, bench.sample_rate_hz)],
             "points": points,
             "run_s": time.perf_counter() - began,
         }
     output.unlink()
     return found
-
-
-def ramp_errors(part: Any, segments: Any) -> list[float]:
-    """Largest mean phase error of a period, deg, in each ramp from one point to the next."""
-    segment, theta = part.rows("segment"), part.rows("theta_rad")
-    error = np.degrees(np.nan_to_num(part.rows("phase_error_rad")))
-    starts = np.flatnonzero(np.append(True, np.diff(theta) < -math.pi))
-    mean = np.abs(np.add.reduceat(error, starts) / np.diff(np.append(starts, error.size)))
-    where = segment[starts]
-    ramps = [k for k, each in enumerate(segments) if each.kind == SegmentKind.RAMP and each.point > 0]
-    return [float(mean[where == k].max()) for k in ramps if (where == k).any()]
 
 
 app = typer.Typer(help=__doc__)

@@ -160,8 +160,8 @@ class RehearsalRequest:
         try:
             twin = self.twin(number)
             unknowns = twin.unknowns
-            known = self.bench.driver.name == "virtual"  # of a real device no filters are known
-            trial = run_trial(self.plan, twin.bench, twin.number, images_known=known)
+            exact = self.knowledge is None  # other twins are like the rig near its mode, not where images lie
+            trial = run_trial(self.plan, twin.bench, twin.number, images_known=exact)
         except (OSError, MemoryError):  # of the machine, not of the twin
             raise
         except Exception as error:  # whatever a drawn rig does to the numbers

@@ -1,5 +1,6 @@
 """Remedies for a plan: changes that are tried on the same twins, one at a time and then together."""
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -8,6 +9,7 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.bench.configuration import merged
+from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import plan_from
@@ -77,22 +79,31 @@ def _windows(table: Table, bench: Bench) -> Iterator[Remedy]:
 
 
 def _levels(plan: Levels, draws: Sequence[Draw]) -> Iterator[Remedy]:
-    key, levels, start = plan.levels_key, sorted(plan.levels), plan.start_v
-    lower: Table = {key: [levels[0] / 3.0, *levels]}
-    if start is not None:
-        lower["start_v"] = start / 3.0
-    yield Remedy("a first level of a third", lower)
+    levels, start = sorted(plan.levels), plan.start_v
+
+    def changed(words: str, others: list[float], start_v: float | None = start) -> Remedy:
+        out: Table = {plan.levels_key: [*others]}
+        if (
+            isinstance(plan, BackbonePlan) and plan.ramp_factors
+        ):  # a ramp is as much longer as the one over its level was
+            factor_of = dict(zip(plan.levels, plan.ramp_factors, strict=True))
+            over = [levels[min(bisect_left(levels, level), len(levels) - 1)] for level in others]
+            out["ramp_factors"] = [factor_of[level] for level in over]
+        if start_v != start:
+            out["start_v"] = start_v
+        return Remedy(words, out)
+
+    third = None if start is None else start / 3.0
+    yield changed("a first level of a third", [levels[0] / 3.0, *levels], third)
     if len(levels) > 1:
-        higher: Table = {key: [*levels[1:]]}
-        if start is not None:
-            higher["start_v"] = start * levels[1] / levels[0]
-        yield Remedy("without the lowest level", higher)
+        second = None if start is None else start * levels[1] / levels[0]
+        yield changed("without the lowest level", levels[1:], second)
         finer = [level for low, high in pairwise(levels) for level in (low, float(np.sqrt(low * high)))]
-        yield Remedy("steps half as large", {key: [*finer, levels[-1]]})
+        yield changed("steps half as large", [*finer, levels[-1]])
     tripped = [draw.trial.level for draw in draws if draw.trial.tripped and np.isfinite(draw.trial.level)]
     below = [level for level in levels if not tripped or level < min(tripped) * (1.0 - 1e-9)]
     if below and len(below) < len(levels):
-        yield Remedy(f"levels up to {level_text(below[-1], plan.level_unit, '.3g')}", {key: [*below]})
+        yield changed(f"levels up to {level_text(below[-1], plan.level_unit, '.3g')}", below)
 
 
 def _gains(table: Table) -> Iterator[Remedy]:

@@ -90,9 +90,9 @@ class LevelChoice:
         """Highest level over lowest."""
         return self.levels_m[-1] / self.levels_m[0]
 
-    def within(self, lowest_m: float, highest_m: float, why: str) -> "LevelChoice":
-        """Return as many levels in equal ratios between two displacements (m peak)."""
-        levels = _spread(lowest_m, highest_m, len(self.levels_m))
+    def within(self, lowest_m: float, highest_m: float, why: str, points: int | None = None) -> "LevelChoice":
+        """Return as many levels, or ``points``, in equal ratios between two displacements (m peak)."""
+        levels = _spread(lowest_m, highest_m, points or len(self.levels_m))
         volts, newtons = self.needed_v[-1] / self.levels_m[-1], self.forces_n[-1] / self.levels_m[-1]
         return replace(
             self,
@@ -213,10 +213,12 @@ def choose_levels(
             f"need {needed_v(plant, highest):.3g} V)",
         )
     if not 0.0 < first < highest:
-        raise ConfigurationError(
-            f"levels from {first:.3g} m to {highest:.3g} m: allowed is a lowest level above 0 and below the highest; the "
-            f"force is above the noise from {told:.3g} m on"
-        )
+        quiet = f"the force is above noise and rounding from {told:.3g} m on, the highest level is {highest:.3g} m"
+        if from_m is None:
+            raise ConfigurationError(
+                f"{quiet}: no level can be measured; a more sensitive force channel would lower the noise"
+            )
+        raise ConfigurationError(quiet, field="from_m", value=first, allowed="above 0 and below the highest level")
     levels = _spread(first, highest, points)
     why = f"the highest is {highest / reach:.2f} of what {limit} allows on the linear plant"
     why += f", the lowest has {needed_n(plant, levels[0]):.3g} N of force"

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
 
@@ -30,18 +31,19 @@ def plan_text(
     measured: ChannelRatios,
     chosen: Chosen,
     levels: LevelChoice,
+    ramp_factors: Sequence[float],
     start: Start,
     window: Window,
     harmonics: HarmonicsChoice | None,
     recording: Path,
 ) -> str:
     """Return a backbone plan as TOML."""
-    volts, settling = chosen.law == "phase", chosen.design.settling.longest
+    settling = chosen.design.settling.longest
     lines = [
         *_summary(plant, chosen),
-        *_levels(bench_name, bench, levels, volts),
-        *([] if volts else _start(plant, chosen, start)),
-        *_ramps(plant, chosen),
+        *_levels(bench_name, bench, levels, chosen.law),
+        *([] if chosen.law == "phase" else _start(plant, chosen, start)),
+        *_ramps(plant, chosen, ramp_factors),
         *_rounding(levels),
         *_controller(plant, chosen, window),
         *([] if harmonics is None else _harmonics(harmonics)),
@@ -51,16 +53,19 @@ def plan_text(
     return "\n".join(lines) + "\n"
 
 
-def _levels(bench_name: str, bench: Bench, levels: LevelChoice, volts: bool) -> list[str]:
+def plan_levels(levels: LevelChoice, law: str) -> list[float]:
+    """Return the levels as a plan with this frequency law has them: V or m, peak."""
+    return [significant(v) for v in levels.needed_v] if law == "phase" else list(levels.levels_m)
+
+
+def _levels(bench_name: str, bench: Bench, levels: LevelChoice, law: str) -> list[str]:
     needed = f"the linear plant needs {levels.needed_v[0]:.3g} to {levels.needed_v[-1]:.3g} V, a nonlinear one may need more."
     return [
         _line("kind", "backbone"),
         _line("description", f"backbone of the {bench.specimen.name}, tuned by rig tune"),
         _line("bench", bench_name),
         *_comment(f"{levels.why[0].upper()}{levels.why[1:]}; {needed}"),
-        _line("levels_v", [significant(v) for v in levels.needed_v])
-        if volts
-        else _line("levels_m", list(levels.levels_m)),
+        _line("levels_v" if law == "phase" else "levels_m", plan_levels(levels, law)),
     ]
 
 
@@ -74,10 +79,12 @@ def _start(plant: PlantModel, chosen: Chosen, start: Start) -> list[str]:
     ]
 
 
-def _ramps(plant: PlantModel, chosen: Chosen) -> list[str]:
+def _ramps(plant: PlantModel, chosen: Chosen, factors: Sequence[float]) -> list[str]:
+    longer = ["# Longer where the phase lagged in a trial.", _line("ramp_factors", list(factors))]
     return [
         "# Slow enough that force and frequency follow with the damping as measured.",
         _line("ramp_periods", ramp_periods(plant, chosen.tracking_periods)),
+        *(longer if factors else []),
         "# A level that loses the lock, or comes near a limit, is left out, and those above it; one that loses it is tried",
         "# once more, by a slower ramp.",
         _line("on_lost_lock", "skip"),

@@ -8,7 +8,7 @@ from rig.text.json_values import JsonValue
 from rig.tuning.design import gains_of
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.plant import mass_ratios
-from rig.tuning.trial import PlanTrial
+from rig.tuning.trial import PlanTrial, ramp_factors
 from rig.tuning.tuning import Tuning
 
 SHOWN_SHIFT = 0.05  # shift of the frequency for which the slope of a cubic spring is given; chosen
@@ -163,7 +163,9 @@ def _held(trial: PlanTrial) -> str:
     """What a trial has held, in a line."""
     held, missing = trial.held, trial.missing
     kept = "all levels were held" if not missing else f"levels {held[0] + 1} to {held[-1] + 1} were held; {missing}"
-    return f"{kept}{'; it tripped' if trial.tripped else ''}"
+    longer = ramp_factors(trial.ramps, [point.level for point in trial.points])
+    lagged = f"; ramps lagged by up to {max(ramp.error_deg for ramp in trial.ramps):.0f} deg" if longer else ""
+    return f"{kept}{'; it tripped' if trial.tripped else ''}{lagged}"
 
 
 def _design_lines(design: Design) -> list[str]:

@@ -1,8 +1,9 @@
 """A trial of a tuned plan: it is carried out once, and the plan keeps the range of levels that was held."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench
 from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.backbone.ramps import Ramp, ramps_in
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.running.runner import run_plan
@@ -38,6 +40,12 @@ LOWERED = 2.0  # highest level over lowest, where levels are lowered; chosen
 DRIFT_WITHIN = 0.6  # of what the plan accepts; chosen: where rounding moves the force, the next record drifts otherwise
 SETTLED_WITHIN = 0.5  # of the longest time allowed for it: a level that takes longer may not settle next time; chosen
 NONHARMONIC_WITHIN = 0.5  # of what the plan accepts; chosen: repeated levels differed by a half
+LAGGED_DEG = 10.0  # phase error in a ramp beyond which the plan's takes longer; chosen
+WANTED_DEG = (
+    4.0  # what such a ramp is made longer for; chosen: a lag at a stop falls less than in proportion to the rate
+)
+NOISE_STDS = 3.0  # of the phase's noise, which are no lag: some hundred periods have one as large
+LEAST_FACTOR, MOST_FACTOR = 1.2, 10.0  # times that a ramp is made longer, if it is; chosen
 
 
 class TrialEndedError(TuningError):
@@ -64,6 +72,8 @@ class PlanTrial:
     """Periods that the plan allows a level to settle."""
     accepted_nonharmonic: float
     """Part of the force away from its harmonics that the plan accepts."""
+    ramps: tuple[Ramp, ...] = ()
+    """Its ramps from level to level."""
 
     @property
     def accepted(self) -> int:
@@ -128,6 +138,16 @@ class PlanTrial:
         why = f"those planned were too large in a trial ({self.missing}; {self.recording.name})"
         return planned.within(highest / LOWERED, highest, why)
 
+    def finer_levels(self, planned: LevelChoice) -> LevelChoice | None:
+        """Return twice as many steps, where a level seems implausible after one that was held: a joint that slips between
+        them changes the force as much as a sensor that fails.
+        """  # noqa: D205
+        missing, points = self._first_missing(), 2 * len(planned.levels_m) - 1
+        if missing is None or missing.quality is not Quality.IMPLAUSIBLE or missing.number - 1 not in self.held:
+            return None
+        why = f"steps half as large, for a level was implausible in a trial ({self.missing}; {self.recording.name})"
+        return planned.within(planned.levels_m[0], planned.levels_m[-1], why, points)
+
     def levels(self, planned: LevelChoice) -> LevelChoice:
         """Return the levels of the plan within the range that was held; the planned ones if all were.
 
@@ -148,6 +168,31 @@ class PlanTrial:
         return min(MIN_HELD_SPAN, planned.span)
 
 
+def ramp_factors(ramps: Sequence[Ramp], levels: Sequence[float]) -> tuple[float, ...]:
+    """Return how many times as long the ramp to each level is to be, after a trial; none if all may be as they are.
+
+    The phase lags by the rate at which a ramp changes the level. Ramps over levels in which the trial lagged by more than
+    `LAGGED_DEG`, above noise, are to lag by `WANTED_DEG`; ramps that are longer already, and need not be, become shorter again.
+    The ramp after one that lagged began slower (`controller.lock`), which it does no longer: it becomes as long as it took, but
+    no longer than the one before.
+    """
+    slowest = [0.0] * len(levels)
+    before = 1.0
+    for ramp in ramps:
+        lag_deg = ramp.error_deg - NOISE_STDS * ramp.noise_deg
+        needed = ramp.planned * lag_deg / WANTED_DEG
+        if lag_deg <= LAGGED_DEG:
+            slower = min(ramp.taken, before) if ramp.taken > LEAST_FACTOR * ramp.planned else 1.0
+            needed = max(min(needed, ramp.planned), slower)
+        before = min(max(needed, 1.0), MOST_FACTOR)
+        for number, (low, high) in enumerate(pairwise(levels), 1):
+            if ramp.start < high and ramp.end > low:
+                as_steep = math.log(high / low) / math.log(ramp.end / ramp.start)
+                slowest[number] = max(slowest[number], before * as_steep)
+    factors = tuple(float(f"{one:.2g}") if one > LEAST_FACTOR else 1.0 for one in slowest)
+    return factors if any(factor > 1.0 for factor in factors) else ()
+
+
 def carried_out(plan: BackbonePlan, bench: Bench, recording: Path, options: RunOptions) -> PlanTrial:
     """Carry out a plan and say how it went.
 
@@ -157,9 +202,10 @@ def carried_out(plan: BackbonePlan, bench: Bench, recording: Path, options: RunO
     once = plan.model_copy(update={"lost_lock_attempts": 1})  # a level that needs a second attempt is not held
     with run_plan(once, bench, recording, options) as recorded:
         end, points = recorded.parts[-1].end, points_of(recorded)
-    if end is None or end["reason"] not in IN_ORDER:
-        text = "" if end is None else end["text"]
-        raise TrialEndedError(f"trial of the plan: {text}; recorded in {recording}")
+        if end is None or end["reason"] not in IN_ORDER:
+            text = "" if end is None else end["text"]
+            raise TrialEndedError(f"trial of the plan: {text}; recorded in {recording}")
+        ramps = ramps_in(recorded.parts[0], plan, bench.sample_rate_hz)
     return PlanTrial(
         recording=recording,
         points=tuple(sorted((point for point in points if not point.repeats_first), key=lambda point: point.number)),
@@ -169,4 +215,5 @@ def carried_out(plan: BackbonePlan, bench: Bench, recording: Path, options: RunO
         accepted_drift=plan.accepted_drift,
         longest_settling=plan.settle_rule.longest_periods,
         accepted_nonharmonic=plan.accepted_nonharmonic_force,
+        ramps=ramps,
     )

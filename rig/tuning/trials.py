@@ -7,7 +7,7 @@ from pathlib import Path
 from rig.arming.run_options import RunOptions
 from rig.tuning.levels import NARROWEST_SPAN, LevelChoice
 from rig.tuning.plant import TuningError
-from rig.tuning.trial import PlanTrial, carried_out
+from rig.tuning.trial import PlanTrial, TrialEndedError, carried_out
 from rig.tuning.tuning import Tuning
 
 TRIALS = 3  # of a plan whose levels change, at most; chosen
@@ -18,16 +18,17 @@ def try_plan(tuning: Tuning, recording: str | Path, options: RunOptions | None =
 
     The plan keeps the longest row of levels that were accepted with something to spare (`PlanTrial.held`), in as many steps. Of
     what lies above them, as a backbone that becomes too steep, or below, as rounding, a linear test tells little. Where levels
-    span little and rounding disturbs some of them, larger ones are tried once; where the lowest were too large, lower ones. A
-    plan whose levels have changed is tried again, up to `TRIALS` times in all. The first trial is recorded in ``recording``,
-    others beside it (`trial_recordings`).
+    span little and rounding disturbs some of them, larger ones are tried once; where the lowest were too large, lower ones, and
+    twice as many where one seemed implausible after the one before. A
+    plan whose levels have changed is tried again, up to `TRIALS` times in all. Ramps in which the phase lagged are made longer
+    (`rig.tuning.trial.ramp_factors`). The first trial is recorded in ``recording``, others beside it (`trial_recordings`).
 
     Raises `rig.tuning.plant.TuningError` if no range of levels was held, `rig.tuning.trial.TrialEndedError` if the run ended
     for another reason, and the errors of `rig.run`.
     """
     options, paths = options or RunOptions(), trial_recordings(Path(recording))
     tuning, found = _first_trial(tuning, paths[0], options)
-    trials = [found]
+    trials, tuning = [found], replace(tuning, ramps=found.ramps)
     while (levels := _after(trials, tuning)) is not tuning.levels:
         notes = tuple(note for note in tuning.notes if note not in tuning.level_notes)
         tuning = replace(tuning, levels=levels, notes=notes)
@@ -35,14 +36,24 @@ def try_plan(tuning: Tuning, recording: str | Path, options: RunOptions | None =
             break
         if options.seed is not None:
             options = replace(options, seed=options.seed + 1)
-        trials.append(carried_out(tuning.plan, tuning.bench, paths[len(trials)], options))
+        trials.append(_tried(tuning, paths[len(trials)], options))
+        tuning = replace(tuning, ramps=trials[-1].ramps)
     return replace(tuning, trials=tuple(trials))
 
 
+def _tried(tuning: Tuning, recording: Path, options: RunOptions) -> PlanTrial:
+    """Carry out the plan; where that ends for another reason than its levels, say what bounds these too."""
+    try:
+        return carried_out(tuning.plan, tuning.bench, recording, options)
+    except TrialEndedError as ended:
+        raise TrialEndedError("; ".join((str(ended), *tuning.level_notes))) from ended
+
+
 def _after(trials: Sequence[PlanTrial], tuning: Tuning) -> LevelChoice:
-    """Return the levels that the last trial held, or lower ones to be tried; a refusal says what bounds those of the plan."""
-    if len(trials) < TRIALS and (lower := trials[-1].lower_levels(tuning.levels)):
-        return lower
+    """Return the levels that the last trial held, or finer or lower ones to be tried; a refusal says what bounds these."""
+    further = trials[-1].finer_levels(tuning.levels) or trials[-1].lower_levels(tuning.levels)
+    if len(trials) < TRIALS and further:
+        return further
     try:
         return trials[-1].levels(tuning.levels)
     except TuningError as refusal:
@@ -56,13 +67,13 @@ def trial_recordings(first: Path) -> list[Path]:
 
 def _first_trial(tuning: Tuning, path: Path, options: RunOptions) -> tuple[Tuning, PlanTrial]:
     """Carry out the plan, or the one of larger levels where these are better; return the tuning with this plan's levels."""
-    found = carried_out(tuning.plan, tuning.bench, path, options)
+    found = _tried(tuning, path, options)
     if tuning.larger is None or not found.is_disturbed or tuning.levels.span >= NARROWEST_SPAN:
         return tuning, found
     note = f"up to a third of the limits rounding disturbs the levels ({found.missing}); these are larger"
     larger = replace(tuning, levels=tuning.larger, larger=None, notes=(*tuning.notes, note))
     beside = path.with_name(f"{path.stem}-larger{path.suffix}")
-    again = carried_out(larger.plan, tuning.bench, beside, options)
+    again = _tried(larger, beside, options)
     if again.held_span(larger.levels) > found.held_span(tuning.levels):
         return larger, replace(again, recording=beside.replace(path))
     beside.unlink()

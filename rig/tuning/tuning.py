@@ -11,6 +11,7 @@ from controller.tuning import PlantModel
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench, load_bench
 from rig.campaigns.backbone.plan import BackbonePlan
+from rig.campaigns.backbone.ramps import Ramp
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.level_search import MultisineSeries
 from rig.errors import ConfigurationError
@@ -30,10 +31,10 @@ from rig.tuning.levels import (
     reach_m,
 )
 from rig.tuning.linear_test import MAX_DISTORTION, LinearTest, SilentError, measure
-from rig.tuning.plan import plan_text
+from rig.tuning.plan import plan_levels, plan_text
 from rig.tuning.plant import ChannelRatios, UnsuitedError, channel_ratios, compared_with_bench, plant_of
 from rig.tuning.shifts import Start, Window, frequency_window, start_of
-from rig.tuning.trial import PlanTrial
+from rig.tuning.trial import PlanTrial, ramp_factors
 from vibrolock.one_thread import one_thread
 from vibrolock.results import Result
 
@@ -124,11 +125,18 @@ class Tuning(Result):
     """Name of the bench in the plan."""
     trials: tuple[PlanTrial, ...] = ()
     """Trials of the plan, if it was carried out (`try_plan`); each but the first of the levels that the one before has held."""
+    ramps: tuple[Ramp, ...] = ()
+    """Ramps of the last trial; those of the plan are longer where the phase lagged in them."""
 
     @property
     def trial(self) -> PlanTrial | None:
         """The last trial, if there was one."""
         return self.trials[-1] if self.trials else None
+
+    @property
+    def ramp_factors(self) -> tuple[float, ...]:
+        """How many times as long as the others the plan's ramp to each level is; none if all are alike."""
+        return ramp_factors(self.ramps, plan_levels(self.levels, self.chosen.law))
 
     @property
     def plan_toml(self) -> str:
@@ -140,6 +148,7 @@ class Tuning(Result):
             ChannelRatios(self.response_ratios, self.response_ratio_stds, self.response_turns_deg),
             self.chosen,
             self.levels,
+            self.ramp_factors,
             self.start,
             self.window,
             self.harmonics,

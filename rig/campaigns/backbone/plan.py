@@ -1,14 +1,14 @@
 """The backbone campaign: step through levels at phase resonance; settle and record whole periods at each level."""
 
 from dataclasses import replace
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from controller.harmonics import MOST_HARMONICS, check_wanted
 from rig.bench import Bench
 from rig.campaigns.planning.locked import SettledPlan
-from rig.campaigns.planning.plan import Target, passes, with_first_repeated
+from rig.campaigns.planning.plan import MOST_POINTS, Target, passes, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 from vibrolock.errors import InputError
@@ -31,6 +31,9 @@ class BackbonePlan(SettledPlan):
     result."""
     ramp_periods: float = Field(20.0, ge=1, le=1e5)
     """Length of the half-cosine ramp between two levels, periods."""
+    ramp_factors: tuple[Annotated[float, Field(ge=0.1, le=100)], ...] = Field((), max_length=MOST_POINTS)
+    """How many times as long the ramp to each level is, one number for every level; none: all ramps are of the same length.
+    Where a backbone becomes steep at once, as where a stop is met, the phase lags less in a longer ramp."""
     record_periods: int = Field(50, ge=4, le=1_000_000)
     """Periods that are evaluated at each level; one more is recorded."""
     force_harmonics: tuple[dict[int, tuple[float, float]], ...] = Field((), max_length=1000)
@@ -51,6 +54,13 @@ class BackbonePlan(SettledPlan):
             raise InputError("need the table controller.harmonics, the loop that makes them", field="force_harmonics")
         for index, wanted in enumerate(self.force_harmonics):
             check_wanted(f"force_harmonics[{index}]", wanted, MOST_HARMONICS if loop is None else loop.highest)
+        return self
+
+    @model_validator(mode="after")
+    def _one_factor_a_level(self) -> Self:
+        if self.ramp_factors and len(self.ramp_factors) != len(self.levels):
+            text = f"{len(self.ramp_factors)} numbers for {len(self.levels)} levels"
+            raise InputError(text, field="ramp_factors", allowed="one for each")
         return self
 
     @property
@@ -91,7 +101,7 @@ class BackbonePlan(SettledPlan):
         for target in left:
             before = self._approach(targets, target)
             if before is not None and before != at:
-                out.append(Segment(SegmentKind.RAMP, -1, before, self.ramp_periods, on_lost_lock=lost))
+                out.append(Segment(SegmentKind.RAMP, -1, before, self._ramp_periods(before), on_lost_lock=lost))
                 out.append(Segment(SegmentKind.HOLD, -1, before, self._hold_periods))
             number, level = target.number, target.level
             at, first = level, at is None and before is None
@@ -99,7 +109,7 @@ class BackbonePlan(SettledPlan):
                 out += self._short_point(target, failure, lost, first)
                 continue
             ramp = Segment(
-                SegmentKind.RAMP, number, level, self.ramp_periods, failure, lost, harmonics=target.harmonics
+                SegmentKind.RAMP, number, level, self._ramp_periods(level), failure, lost, harmonics=target.harmonics
             )
             out.append(ramp)
             out.append(replace(ramp, kind=SegmentKind.SETTLE, periods=self.settle.longest_periods))
@@ -123,7 +133,7 @@ class BackbonePlan(SettledPlan):
             SegmentKind.RAMP,
             number,
             level,
-            self.ramp_periods,
+            self._ramp_periods(level),
             failure,
             lost,
             geometric=geometric,
@@ -134,6 +144,10 @@ class BackbonePlan(SettledPlan):
         # A ramp from a level to the same level: the point is judged by its slow flow, not by the settle rule.
         held = replace(ramp, kind=SegmentKind.LEVEL_SWEEP, periods=self.record_periods)
         return [*(out if first else ()), ramp, held]
+
+    def _ramp_periods(self, level: float) -> float:
+        factors = dict(zip(self.levels, self.ramp_factors, strict=True)) if self.ramp_factors else {}
+        return self.ramp_periods * factors.get(level, 1.0)
 
     @property
     def _hold_periods(self) -> float:

@@ -89,6 +89,15 @@ def test_every_kind_of_plan_has_remedies_that_are_plans(name):
             assert remedy.changes[key] != table.get(key), remedy.name
 
 
+def test_other_levels_keep_the_longer_ramps():
+    table = load_plan("magnet-beam/backbone").model_dump(mode="json", exclude_none=True)
+    plan = plan_from(table | {"levels_v": [0.4, 0.1, 0.2], "ramp_factors": [4.0, 1.0, 2.0]}, "longer")
+    changes = {remedy.name: remedy.changes for remedy in remedies_for(plan, magnet_beam(), ())}
+    assert changes["without the lowest level"] == {"levels_v": [0.2, 0.4], "ramp_factors": [2.0, 4.0]}
+    assert changes["a first level of a third"]["ramp_factors"] == [1.0, 1.0, 2.0, 4.0]
+    assert changes["steps half as large"]["ramp_factors"] == [1.0, 2.0, 2.0, 4.0, 4.0]
+
+
 def draw(number, *, completed, tripped=False, accepted=0, computed=True):
     points = tuple(SimpleNamespace(accepted=k < accepted) for k in range(10))
     trial = SimpleNamespace(

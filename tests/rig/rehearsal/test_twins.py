@@ -8,9 +8,11 @@ from rig.bench.bench import DriverChoice
 from rig.campaigns.plans import load_plan
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
+from rig.rehearsal import rehearsal
 from rig.rehearsal.files import write_bench
 from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
-from rig.rehearsal.trial import run_trial
+from rig.rehearsal.rehearsal import RehearsalRequest
+from rig.rehearsal.trial import not_computed, run_trial
 from rig.rehearsal.twins import draw_twin, highest_displacement_m
 from simulators.analysis import phase_resonance_backbone
 from tests.refused import refused
@@ -114,3 +116,18 @@ def test_wrong_hypotheses_are_named(tmp_path, text, says):
     with refused(ConfigurationError, "toml") as error:
         load_hypotheses(tmp_path / "h.toml")
     assert says in str(error.value)
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_images_are_judged_on_a_twin_that_is_the_bench_itself(monkeypatch, exact):
+    """Another twin is like the rig near its mode only; images come through what lies far above."""
+    known = []
+
+    def run(plan, bench, seed, *, images_known):
+        known.append(images_known)
+        return not_computed(ValueError("seen"))
+
+    monkeypatch.setattr(rehearsal, "run_trial", run)
+    knowledge = None if exact else knowledge_of_the_magnet_beam()
+    RehearsalRequest(plan=SHORT, bench=magnet_beam(), knowledge=knowledge, balanced=False)(0)
+    assert known == [exact]

@@ -3,18 +3,20 @@
 import dataclasses
 import json
 import shutil
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from rig.arming.run_options import RunOptions
+from rig.campaigns.backbone.ramps import Ramp
 from rig.campaigns.evaluation.point import Point, Purity, Quality, Spectrum, Vibration
 from rig.campaigns.plans import load_plan
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 from rig.tuning import TuningError, TuningRequest, try_plan, tune
 from rig.tuning.levels import LevelChoice
-from rig.tuning.trial import IN_ORDER, PlanTrial, TrialEndedError
+from rig.tuning.trial import IN_ORDER, PlanTrial, TrialEndedError, ramp_factors
 from tests.refused import refused
 from tests.rig.tuning.tuned import tuned_once
 
@@ -137,6 +139,42 @@ def test_levels_are_lowered_where_the_lowest_were_too_large(tmp_path, qualities,
     assert trial(tmp_path, point(0), tripped=True).lower_levels(PLANNED) is None
 
 
+def test_steps_become_finer_where_a_joint_slips_from_one_level_to_the_next(tmp_path, monkeypatch):
+    tuning = dataclasses.replace(tuned_once("magnet-beam"), levels=PLANNED, larger=None)
+    played = []
+
+    def carried_out(plan, bench, recording, options):
+        played.append(plan.levels_m)
+        few = len(plan.levels_m) == len(PLANNED.levels_m)
+        qualities = [
+            Quality.IMPLAUSIBLE if few and number > 1 else Quality.GOOD for number in range(len(plan.levels_m))
+        ]
+        points = [dataclasses.replace(point(0, quality), number=number) for number, quality in enumerate(qualities)]
+        return dataclasses.replace(trial(tmp_path, *points), recording=recording)
+
+    monkeypatch.setattr("rig.tuning.trials.carried_out", carried_out)
+    found = try_plan(tuning, tmp_path / "t.h5")
+    assert played == [PLANNED.levels_m, pytest.approx(np.geomspace(1e-4, 8e-4, 7), rel=1e-3)]
+    assert found.levels.levels_m == played[-1]
+    assert "steps half as large" in found.levels.why
+
+
+def test_a_level_that_is_implausible_from_the_beginning_is_no_reason_for_finer_steps(tmp_path):
+    assert trial(tmp_path, point(0, Quality.IMPLAUSIBLE), point(1)).finer_levels(PLANNED) is None
+    assert trial(tmp_path, *map(point, range(4))).finer_levels(PLANNED) is None
+
+
+def test_a_trial_that_ends_for_another_reason_says_what_bounds_the_levels(tmp_path, monkeypatch):
+    tuning = dataclasses.replace(tuned_once("magnet-beam"), level_notes=("five bits of force",))
+
+    def carried_out(plan, bench, recording, options):
+        raise TrialEndedError("sensor dead")
+
+    monkeypatch.setattr("rig.tuning.trials.carried_out", carried_out)
+    with pytest.raises(TrialEndedError, match=r"^sensor dead; five bits of force$"):
+        try_plan(tuning, tmp_path / "t.h5")
+
+
 def test_a_plan_whose_lowest_levels_were_too_large_is_tried_with_lower_ones(tmp_path, monkeypatch):
     tuning = dataclasses.replace(tuned_once("magnet-beam"), levels=PLANNED, larger=None)
     played = []
@@ -204,6 +242,46 @@ def test_a_plan_that_a_trial_has_changed_is_tried_again_until_its_levels_are_hel
     found = try_plan(tuning, tmp_path / "t.h5")
     assert len(played) == len(found.trials) == 3
     assert found.levels.levels_m[-1] < played[-1][0][-1]
+
+
+def test_ramps_in_which_the_trial_lagged_are_longer():
+    levels = [1.0, 2.0, 4.0, 8.0]
+
+    def factors(*lagged, then=(1.0, 1.0, 3.0, 0.1), levels=levels):
+        return ramp_factors(
+            [Ramp(1.0, 2.0, 1.0, 1.0, 9.9, 0.1), Ramp(2.0, 4.0, *lagged), Ramp(4.0, 8.0, *then)], levels
+        )
+
+    assert factors(1.0, 1.0, 9.9, 0.0) == ()
+    assert factors(1.0, 1.0, 12.0, 1.0) == ()  # noise
+    assert factors(1.0, 1.0, 12.0, 0.0) == (1.0, 1.0, 3.0, 1.0)
+    assert factors(2.0, 3.0, 12.0, 0.0) == (1.0, 1.0, 6.0, 1.0)  # longer already, and not enough
+    assert factors(2.0, 3.0, 6.0, 0.0, then=(2.0, 2.0, 2.0, 0.0)) == (1.0, 1.0, 2.0, 1.0)  # long enough
+    assert factors(1.0, 1.0, 90.0, 0.0) == (1.0, 1.0, 10.0, 1.0)
+    slower = (1.0, 2.5, 9.0, 0.0)  # after a lag in the ramp before
+    assert factors(1.0, 1.0, 12.0, 0.0, then=slower) == (1.0, 1.0, 3.0, 2.5)
+    assert factors(1.0, 1.0, 12.0, 0.0, then=(1.0, 9.0, 9.0, 0.0)) == (1.0, 1.0, 3.0, 3.0)
+    half = [1.0, 2.0, 2.0 * 2.0**0.5, 4.0]  # steps half as large
+    assert factors(1.0, 1.0, 16.0, 0.0, levels=half) == (1.0, 1.0, 2.0, 2.0)
+    assert ramp_factors([], levels) == ()
+
+
+def test_a_second_trial_has_the_longer_ramps_of_the_first(tmp_path, monkeypatch):
+    tuning = dataclasses.replace(tuned_once("magnet-beam"), levels=PLANNED, larger=None)
+    played = []
+
+    def carried_out(plan, bench, recording, options):
+        played.append(plan)
+        qualities = [Quality.GOOD] * 3 + [Quality.TOO_STEEP if len(played) == 1 else Quality.GOOD]
+        factor = (plan.ramp_factors or (1.0,))[-1]
+        ramps = tuple(Ramp(*levels, factor, factor, 12.0 / factor, 0.0) for levels in pairwise(plan.levels_m[-3:]))
+        return dataclasses.replace(trial(tmp_path, *map(point, range(4), qualities)), recording=recording, ramps=ramps)
+
+    monkeypatch.setattr("rig.tuning.trials.carried_out", carried_out)
+    found = try_plan(tuning, tmp_path / "t.h5")
+    assert played[0].ramp_factors == ()
+    assert played[1].ramp_factors == found.plan.ramp_factors == (1.0, 1.0, 2.0, 2.0)
+    assert "ramp_factors = [1.0, 1.0, 2.0, 2.0]" in found.plan_toml
 
 
 @pytest.mark.slow

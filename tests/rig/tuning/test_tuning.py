@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from rig.recording.reader import Recording
 from rig.tuning import TuningError, TuningRequest, tune
 from rig.tuning.design import choose as choose_gains
 from rig.tuning.figure import draw_on
+from rig.tuning.levels import LowestForce, choose_levels
 from rig.tuning.plant import UnsuitedError, compared_with_bench
 from rig.tuning.report import summary
 from simulators import VirtualRig
@@ -135,6 +137,15 @@ def test_what_cannot_be_is_refused_before_anything_moves(request_, said, tmp_pat
     with refused(ConfigurationError, **said):
         tune("magnet-beam", tmp_path / "test.h5", TuningRequest(**request_))
     assert not (tmp_path / "test.h5").exists()
+
+
+def test_levels_below_the_noise_are_refused_with_the_noise():
+    tuning = tuned_once("magnet-beam")
+    choice = partial(choose_levels, tuning.bench, tuning.plant, tuning.response_ratios, highest_m=1e-4)
+    with refused(ConfigurationError, "force-is-above-noise-no-level"):
+        choice(lowest=LowestForce(10.0))
+    with refused(ConfigurationError, "force-is-above-noise", field="from_m", value=2e-4):
+        choice(lowest=LowestForce(1e-3), from_m=2e-4)
 
 
 def sensors_with(name, **changes):

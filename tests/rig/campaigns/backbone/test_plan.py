@@ -5,8 +5,10 @@ import pytest
 from controller import preset
 from rig.bench import shipped_benches
 from rig.campaigns.backbone.plan import BackbonePlan
-from rig.campaigns.plans import bench_of, load_plan, shipped_plans
+from rig.campaigns.plans import bench_of, load_plan, plan_from, shipped_plans
+from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
+from tests.refused import refused
 
 
 def _plan(**changes):
@@ -27,6 +29,20 @@ def test_the_levels_are_sorted_by_the_direction(direction, levels):
 def test_every_point_is_ramped_settled_and_recorded():
     kinds = [segment.kind for segment in _plan().segments(5000.0)]
     assert kinds == [SegmentKind.RAMP, SegmentKind.SETTLE, SegmentKind.RECORD] * 3
+
+
+def test_ramps_to_some_levels_are_longer():
+    plan = _plan(ramp_factors=[1, 2.5, 1], direction="up-down")
+    ramps = {s.level: s.periods for s in plan.segments(5000.0) if s.kind is SegmentKind.RAMP}
+    assert ramps == {0.4: 20.0, 0.2: 50.0, 0.6: 20.0}
+    resumed = plan.segments(5000.0, done=frozenset({0, 1, 2, 3}))
+    assert [s.periods for s in resumed if s.kind is SegmentKind.RAMP] == [20.0, 50.0]
+
+
+@pytest.mark.parametrize(("factors", "field"), [([1, 2], "ramp_factors"), ([1, 2, 0.01], "ramp_factors[2]")])
+def test_factors_of_ramps_that_do_not_fit_are_refused(factors, field):
+    with refused(ConfigurationError, field=field):
+        plan_from(_plan().model_dump(mode="json", exclude_none=True) | {"ramp_factors": factors}, "plan")
 
 
 def test_a_resumed_point_is_approached_from_the_level_before():
