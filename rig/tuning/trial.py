@@ -188,7 +188,7 @@ def ramp_factors(ramps: Sequence[Ramp], levels: Sequence[float]) -> tuple[float,
         for number, (low, high) in enumerate(pairwise(levels), 1):
             if ramp.start < high and ramp.end > low:
                 as_steep = math.log(high / low) / math.log(ramp.end / ramp.start)
-                slowest[number] = max(slowest[number], before * as_steep)
+                slowest[number] = max(slowest[number], min(before * as_steep, MOST_FACTOR))
     factors = tuple(float(f"{one:.2g}") if one > LEAST_FACTOR else 1.0 for one in slowest)
     return factors if any(factor > 1.0 for factor in factors) else ()
 

@@ -19,26 +19,30 @@ def try_plan(tuning: Tuning, recording: str | Path, options: RunOptions | None =
     The plan keeps the longest row of levels that were accepted with something to spare (`PlanTrial.held`), in as many steps. Of
     what lies above them, as a backbone that becomes too steep, or below, as rounding, a linear test tells little. Where levels
     span little and rounding disturbs some of them, larger ones are tried once; where the lowest were too large, lower ones, and
-    twice as many where one seemed implausible after the one before. A
-    plan whose levels have changed is tried again, up to `TRIALS` times in all. Ramps in which the phase lagged are made longer
-    (`rig.tuning.trial.ramp_factors`). The first trial is recorded in ``recording``, others beside it (`trial_recordings`).
+    twice as many where one seemed implausible after the one before. A plan whose levels have changed is tried again, up to
+    `TRIALS` times in all; then levels that were all accepted once, with less to spare, are better than others that were never
+    tried. Ramps in which the phase lagged are made longer (`rig.tuning.trial.ramp_factors`). The first trial is recorded in
+    ``recording``, others beside it (`trial_recordings`).
 
     Raises `rig.tuning.plant.TuningError` if no range of levels was held, `rig.tuning.trial.TrialEndedError` if the run ended
     for another reason, and the errors of `rig.run`.
     """
     options, paths = options or RunOptions(), trial_recordings(Path(recording))
     tuning, found = _first_trial(tuning, paths[0], options)
-    trials, tuning = [found], replace(tuning, ramps=found.ramps)
-    while (levels := _after(trials, tuning)) is not tuning.levels:
+    tuning, tried = replace(tuning, ramps=found.ramps), [(tuning.levels, found)]
+    while (levels := _after(tried, tuning)) is not tuning.levels:
         notes = tuple(note for note in tuning.notes if note not in tuning.level_notes)
         tuning = replace(tuning, levels=levels, notes=notes)
-        if len(trials) == TRIALS:
+        if len(tried) == TRIALS:
+            ramps = next((trial.ramps for one, trial in tried if one is levels), found.ramps)
+            tuning = replace(tuning, ramps=ramps)
             break
         if options.seed is not None:
             options = replace(options, seed=options.seed + 1)
-        trials.append(_tried(tuning, paths[len(trials)], options))
-        tuning = replace(tuning, ramps=trials[-1].ramps)
-    return replace(tuning, trials=tuple(trials))
+        found = _tried(tuning, paths[len(tried)], options)
+        tuning = replace(tuning, ramps=found.ramps)
+        tried.append((levels, found))
+    return replace(tuning, trials=tuple(trial for _, trial in tried))
 
 
 def _tried(tuning: Tuning, recording: Path, options: RunOptions) -> PlanTrial:
@@ -49,15 +53,23 @@ def _tried(tuning: Tuning, recording: Path, options: RunOptions) -> PlanTrial:
         raise TrialEndedError("; ".join((str(ended), *tuning.level_notes))) from ended
 
 
-def _after(trials: Sequence[PlanTrial], tuning: Tuning) -> LevelChoice:
-    """Return the levels that the last trial held, or finer or lower ones to be tried; a refusal says what bounds these."""
-    further = trials[-1].finer_levels(tuning.levels) or trials[-1].lower_levels(tuning.levels)
-    if len(trials) < TRIALS and further:
+def _after(tried: Sequence[tuple[LevelChoice, PlanTrial]], tuning: Tuning) -> LevelChoice:
+    """Return the levels that follow from the trials; those of the last one if these were held.
+
+    A refusal says what bounds these.
+    """
+    planned, last = tried[-1]
+    if len(tried) < TRIALS and (further := last.finer_levels(planned) or last.lower_levels(planned)):
         return further
+    accepted = [levels for levels, trial in tried if trial.accepted == len(levels.levels_m) and len(tried) == TRIALS]
+    widest = max(accepted, key=lambda levels: levels.span, default=None)
     try:
-        return trials[-1].levels(tuning.levels)
+        held = last.levels(planned)
     except TuningError as refusal:
+        if widest is not None:
+            return widest
         raise TuningError("; ".join((str(refusal), *tuning.level_notes))) from refusal
+    return held if held is planned else widest or held
 
 
 def trial_recordings(first: Path) -> list[Path]:

@@ -244,6 +244,25 @@ def test_a_plan_that_a_trial_has_changed_is_tried_again_until_its_levels_are_hel
     assert found.levels.levels_m[-1] < played[-1][0][-1]
 
 
+def test_levels_that_were_all_accepted_are_better_than_some_that_were_never_tried(tmp_path, monkeypatch):
+    """A first level that drifted a little is left out; the one above is lost at the start, for a stop lies between them."""
+    tuning = dataclasses.replace(tuned_once("magnet-beam"), levels=PLANNED, larger=None)
+    played = []
+
+    def carried_out(plan, bench, recording, options):
+        played.append(plan.levels_m)
+        first = point(0, Quality.LOST_LOCK) if len(played) == 3 else point(0, settled_after=700.0)
+        ramps = (Ramp(4e-4, 8e-4, 1.0, 1.0, 12.0 * len(played), 0.0),)
+        return dataclasses.replace(trial(tmp_path, first, *map(point, range(1, 4))), recording=recording, ramps=ramps)
+
+    monkeypatch.setattr("rig.tuning.trials.carried_out", carried_out)
+    found = try_plan(tuning, tmp_path / "t.h5")
+    assert [levels[0] for levels in played] == pytest.approx([1e-4, 2e-4, 3.17e-4], rel=1e-2)
+    assert found.levels is PLANNED
+    assert found.ramp_factors == (1.0, 1.0, 1.0, 3.0)  # of their trial
+    assert len(found.trials) == 3
+
+
 def test_ramps_in_which_the_trial_lagged_are_longer():
     levels = [1.0, 2.0, 4.0, 8.0]
 
