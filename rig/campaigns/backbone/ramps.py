@@ -24,7 +24,7 @@ class Ramp(NamedTuple):
     error_deg: float
     """Largest mean phase error of a period in it, deg."""
     noise_deg: float
-    """Standard deviation of the mean phase error of a period in the record of the point before, deg."""
+    """Standard deviation of the mean phase error of a period in the records of the two points, deg; the larger one."""
 
 
 def ramps_in(part: Part, plan: BackbonePlan, sample_rate_hz: float) -> tuple[Ramp, ...]:
@@ -44,6 +44,8 @@ def ramps_in(part: Part, plan: BackbonePlan, sample_rate_hz: float) -> tuple[Ram
             continue
         if each.kind is SegmentKind.RECORD:
             before, noise = each.level, float(np.std(errors))
+            if out and out[-1].end == each.level:
+                out[-1] = out[-1]._replace(noise_deg=float(np.fmax(noise, out[-1].noise_deg)))
         elif each.kind is SegmentKind.RAMP and each.point > 0:
             planned, took = each.periods / plan.ramp_periods, errors.size / plan.ramp_periods
             out.append(Ramp(before, each.level, planned, took, float(np.abs(errors).max()), noise))
