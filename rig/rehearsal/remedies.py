@@ -83,9 +83,8 @@ def _levels(plan: Levels, draws: Sequence[Draw]) -> Iterator[Remedy]:
 
     def changed(words: str, others: list[float], start_v: float | None = start) -> Remedy:
         out: Table = {plan.levels_key: [*others]}
-        if (
-            isinstance(plan, BackbonePlan) and plan.ramp_factors
-        ):  # a ramp is as much longer as the one over its level was
+        # a ramp is as much longer as the one over its level was
+        if isinstance(plan, BackbonePlan) and plan.ramp_factors:
             factor_of = dict(zip(plan.levels, plan.ramp_factors, strict=True))
             over = [levels[min(bisect_left(levels, level), len(levels) - 1)] for level in others]
             out["ramp_factors"] = [factor_of[level] for level in over]

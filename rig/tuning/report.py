@@ -7,8 +7,9 @@ from controller.tuning import Design
 from rig.text.json_values import JsonValue
 from rig.tuning.design import gains_of
 from rig.tuning.harmonics import HarmonicsChoice
+from rig.tuning.longer_ramps import ramp_factors
 from rig.tuning.plant import mass_ratios
-from rig.tuning.trial import PlanTrial, ramp_factors
+from rig.tuning.trial import PlanTrial
 from rig.tuning.tuning import Tuning
 
 SHOWN_SHIFT = 0.05  # shift of the frequency for which the slope of a cubic spring is given; chosen

@@ -1,9 +1,8 @@
 """A trial of a tuned plan: it is carried out once, and the plan keeps the range of levels that was held."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby, pairwise
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -40,12 +39,6 @@ LOWERED = 2.0  # highest level over lowest, where levels are lowered; chosen
 DRIFT_WITHIN = 0.6  # of what the plan accepts; chosen: where rounding moves the force, the next record drifts otherwise
 SETTLED_WITHIN = 0.5  # of the longest time allowed for it: a level that takes longer may not settle next time; chosen
 NONHARMONIC_WITHIN = 0.5  # of what the plan accepts; chosen: repeated levels differed by a half
-LAGGED_DEG = 10.0  # phase error in a ramp beyond which the plan's takes longer; chosen
-WANTED_DEG = (
-    4.0  # what such a ramp is made longer for; chosen: a lag at a stop falls less than in proportion to the rate
-)
-NOISE_STDS = 3.0  # of the phase's noise, which are no lag: some hundred periods have one as large
-LEAST_FACTOR, MOST_FACTOR = 1.2, 10.0  # times that a ramp is made longer, if it is; chosen
 
 
 class TrialEndedError(TuningError):
@@ -166,31 +159,6 @@ class PlanTrial:
 
     def _needed_span(self, planned: LevelChoice) -> float:
         return min(MIN_HELD_SPAN, planned.span)
-
-
-def ramp_factors(ramps: Sequence[Ramp], levels: Sequence[float]) -> tuple[float, ...]:
-    """Return how many times as long the ramp to each level is to be, after a trial; none if all may be as they are.
-
-    The phase lags by the rate at which a ramp changes the level. Ramps over levels in which the trial lagged by more than
-    `LAGGED_DEG`, above noise, are to lag by `WANTED_DEG`; ramps that are longer already, and need not be, become shorter again.
-    The ramp after one that lagged began slower (`controller.lock`), which it does no longer: it becomes as long as it took, but
-    no longer than the one before.
-    """
-    slowest = [0.0] * len(levels)
-    before = 1.0
-    for ramp in ramps:
-        lag_deg = ramp.error_deg - NOISE_STDS * ramp.noise_deg
-        needed = ramp.planned * lag_deg / WANTED_DEG
-        if lag_deg <= LAGGED_DEG:
-            slower = min(ramp.taken, before) if ramp.taken > LEAST_FACTOR * ramp.planned else 1.0
-            needed = max(min(needed, ramp.planned), slower)
-        before = min(max(needed, 1.0), MOST_FACTOR)
-        for number, (low, high) in enumerate(pairwise(levels), 1):
-            if ramp.start < high and ramp.end > low:
-                as_steep = math.log(high / low) / math.log(ramp.end / ramp.start)
-                slowest[number] = max(slowest[number], min(before * as_steep, MOST_FACTOR))
-    factors = tuple(float(f"{one:.2g}") if one > LEAST_FACTOR else 1.0 for one in slowest)
-    return factors if any(factor > 1.0 for factor in factors) else ()
 
 
 def carried_out(plan: BackbonePlan, bench: Bench, recording: Path, options: RunOptions) -> PlanTrial:

@@ -21,7 +21,7 @@ def try_plan(tuning: Tuning, recording: str | Path, options: RunOptions | None =
     span little and rounding disturbs some of them, larger ones are tried once; where the lowest were too large, lower ones, and
     twice as many where one seemed implausible after the one before. A plan whose levels have changed is tried again, up to
     `TRIALS` times in all; then levels that were all accepted once, with less to spare, are better than others that were never
-    tried. Ramps in which the phase lagged are made longer (`rig.tuning.trial.ramp_factors`). The first trial is recorded in
+    tried. Ramps in which the phase lagged are made longer (`rig.tuning.longer_ramps`). The first trial is recorded in
     ``recording``, others beside it (`trial_recordings`).
 
     Raises `rig.tuning.plant.TuningError` if no range of levels was held, `rig.tuning.trial.TrialEndedError` if the run ended

@@ -31,10 +31,11 @@ from rig.tuning.levels import (
     reach_m,
 )
 from rig.tuning.linear_test import MAX_DISTORTION, LinearTest, SilentError, measure
+from rig.tuning.longer_ramps import ramp_factors
 from rig.tuning.plan import plan_levels, plan_text
 from rig.tuning.plant import ChannelRatios, UnsuitedError, channel_ratios, compared_with_bench, plant_of
 from rig.tuning.shifts import Start, Window, frequency_window, start_of
-from rig.tuning.trial import PlanTrial, ramp_factors
+from rig.tuning.trial import PlanTrial
 from vibrolock.one_thread import one_thread
 from vibrolock.results import Result
 

@@ -22,7 +22,9 @@ def plan(**changes):
 
 
 def test_each_ramp_has_its_length_and_the_largest_mean_error_of_a_period():
-    segments = np.array([0, 1, 2, 2, 3, 3, 3, 4, 5, 5, 6, 6, 7, 8])  # of each period: ramp, settle and record, three times
+    segments = np.array(
+        [0, 1, 2, 2, 3, 3, 3, 4, 5, 5, 6, 6, 7, 8]
+    )  # of each period: ramp, settle and record, three times
     mean_deg = np.array([40.0, 5.0, 1.0, -3.0, 1.0, -12.0, 3.0, 0.0, -1.0, 5.0, 8.0, 7.0, 2.0, 0.0])
     theta = np.tile(np.linspace(0.0, 2.0 * np.pi, PER_PERIOD, endpoint=False), segments.size)
     ripple = 90.0 * np.cos(theta)  # within a period, of no effect on its mean
