@@ -4,10 +4,10 @@
   there are so many of each kind, with stops, with joints and smooth ones (cubic springs, magnets), and tries those that have no
   result yet,
 - ``python -m benchmarks.rehearsed_rigs table FOLDER ...`` shows reliability and Brier score by kind, what was foreseen and what
-  happened, and the largest phase error in ramps, with the feed-forward of the frequency and without it.
+  happened, and the largest phase error in ramps, as tuned and without feed-forward and longer ramps.
 
 - ``python -m benchmarks.rehearsed_rigs figure BENCH PLAN ramps.png`` draws level, frequency and phase error over one run,
-  with the feed-forward and without it.
+  as tuned, and without feed-forward and longer ramps.
 
 Several folders count as one batch.
 """
@@ -54,7 +54,7 @@ def kind_of(bench: dict[str, Any]) -> str:
 
 
 def tried(path: Path) -> dict[str, Any]:
-    """Tune a bench, try the plan, rehearse it and run it three times, and once without the feed-forward."""
+    """Tune a bench, try the plan, rehearse it and run it three times, and once without feed-forward and longer ramps."""
     bench, seed = load_bench(path), int(path.stem.split("-")[-1])
     out: dict[str, Any] = {"rig": path.stem, "words": bench.description.removeprefix("drawn: ")}
     recording, began = path.with_name(f"{path.stem}-tune.h5"), time.perf_counter()
@@ -94,7 +94,8 @@ def tried(path: Path) -> dict[str, Any]:
         ],
         "rehearsal_s": time.perf_counter() - began,
     }
-    plain = plan.model_copy(update={"controller": plan.law.model_copy(update={"frequency_feed_forward": False})})
+    by_phase = plan.law.model_copy(update={"frequency_feed_forward": False})
+    plain = plan.model_copy(update={"controller": by_phase, "ramp_factors": ()})
     out["runs"] = [_run(bench, plan, path, 10**6 + seed + number) for number in range(RUNS)]
     out["without"] = _run(bench, plain, path, 10**6 + seed)
     return out
@@ -191,7 +192,7 @@ def _reason(run: dict[str, Any]) -> str:
 
 @app.command()
 def figure(bench: Path, plan: Path, output: Path, seed: int = 1) -> None:
-    """Draw level, frequency and phase error over a run of a tuned plan, with the feed-forward and without it."""
+    """Draw level, frequency and phase error over a run of a tuned plan, as tuned, and without feed-forward and longer ramps."""
     from matplotlib.figure import Figure
 
     rig_bench, tuned = load_bench(bench), load_plan(plan)
@@ -200,7 +201,9 @@ def figure(bench: Path, plan: Path, output: Path, seed: int = 1) -> None:
     for follows, color in ((False, "C1"), (True, "C0")):
         controller = tuned.law.model_copy(update={"frequency_feed_forward": follows})
         recording = output.with_suffix(".h5")
-        changed = tuned.model_copy(update={"controller": controller})
+        changed = tuned.model_copy(
+            update={"controller": controller, "ramp_factors": tuned.ramp_factors if follows else ()}
+        )
         with rig.run(changed, bench=rig_bench, output=recording, seed=seed, overwrite=True) as run:
             part = run.recording.parts[-1]
             drive = part.rows("inputs")[:, rig_bench.index_of("drive")]
@@ -214,7 +217,7 @@ def figure(bench: Path, plan: Path, output: Path, seed: int = 1) -> None:
             level = np.sqrt(2.0 * mean(drive**2)) / (2.0 * math.pi * mean(hertz)) ** 2
             time_s = starts / rig_bench.sample_rate_hz
             error = np.degrees(mean(part.rows("phase_error_rad")))
-        label = "frequency follows the points before" if follows else "without"
+        label = "as tuned" if follows else "without feed-forward, ramps of one length"
         for axes, values in zip(panels, (1e3 * level, mean(hertz), error), strict=True):
             axes.plot(time_s, values, color=color, lw=0.9, label=label)
         recording.unlink()

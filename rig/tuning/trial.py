@@ -35,6 +35,7 @@ AS_ROUNDING = (Quality.REJECTED, Quality.NOT_SETTLED, Quality.DISTURBED)
 """Qualities of levels that rounding may spoil. Others are no better further up: a lock that is lost, a limit that is near."""
 TOO_LARGE = (Quality.LOST_LOCK, Quality.TOO_STEEP, Quality.NEAR_LIMIT)
 """Qualities of levels at which a structure may be too nonlinear."""
+REPEATED_WITHIN = 1.5  # the force of the same level in another trial, as a factor; chosen
 LOWERED = 2.0  # highest level over lowest, where levels are lowered; chosen
 DRIFT_WITHIN = 0.6  # of what the plan accepts; chosen: where rounding moves the force, the next record drifts otherwise
 SETTLED_WITHIN = 0.5  # of the longest time allowed for it: a level that takes longer may not settle next time; chosen
@@ -140,6 +141,20 @@ class PlanTrial:
             return None
         why = f"steps half as large, for a level was implausible in a trial ({self.missing}; {self.recording.name})"
         return planned.within(planned.levels_m[0], planned.levels_m[-1], why, points)
+
+    def check_repeats(self, other: "PlanTrial") -> None:
+        """Raise `TuningError` unless the lowest level took about the force that it took in another trial.
+
+        A joint that slips above it does so again; a sensor that has failed on the way stays as it is.
+        """
+        first, second = (next((p.vibration for p in one.points if p.number == 0), None) for one in (other, self))
+        if first is None or second is None:
+            return
+        if max(first.force_n, second.force_n) > REPEATED_WITHIN * min(first.force_n, second.force_n):
+            raise TuningError(
+                f"the lowest level took {first.force_n:.3g} N in one trial and {second.force_n:.3g} N in the next; in the one "
+                f"before {other.missing}; recorded in {other.recording} and {self.recording}"
+            )
 
     def levels(self, planned: LevelChoice) -> LevelChoice:
         """Return the levels of the plan within the range that was held; the planned ones if all were.

@@ -59,6 +59,8 @@ def _after(tried: Sequence[tuple[LevelChoice, PlanTrial]], tuning: Tuning) -> Le
     A refusal says what bounds these.
     """
     planned, last = tried[-1]
+    if len(tried) > 1 and len(planned.levels_m) > len(tried[-2][0].levels_m):  # finer steps
+        last.check_repeats(tried[-2][1])
     if len(tried) < TRIALS and (further := last.finer_levels(planned) or last.lower_levels(planned)):
         return further
     accepted = [levels for levels, trial in tried if trial.accepted == len(levels.levels_m) and len(tried) == TRIALS]

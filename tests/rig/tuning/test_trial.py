@@ -159,6 +159,45 @@ def test_steps_become_finer_where_a_joint_slips_from_one_level_to_the_next(tmp_p
     assert "steps half as large" in found.levels.why
 
 
+@pytest.mark.parametrize("failed", [False, True])
+def test_finer_steps_are_for_a_joint_and_not_for_a_sensor_that_has_failed(tmp_path, monkeypatch, failed):
+    """The force seems five times as large from the second level of the first trial on, for a joint at a low level no more."""
+    tuning = dataclasses.replace(tuned_once("magnet-beam"), levels=PLANNED, larger=None)
+    purity = Purity(force_purity=1.0, response_purity=1.0, power_indicator=1.0, harmonic_power=0.0)
+    played = []
+
+    def carried_out(plan, bench, recording, options):
+        played.append(plan.levels_m)
+        count, few = len(plan.levels_m), len(played) == 1
+        force_n = 0.05 if failed and not few else 0.01
+        seen = Vibration(
+            frequency_hz=24.0,
+            force_n=force_n,
+            amplitude_m=1e-4,
+            voltage_v=0.1,
+            purity=purity,
+            periods=50,
+            spectrum=None,
+        )
+        qualities = [Quality.IMPLAUSIBLE if few and number > 1 else Quality.GOOD for number in range(count)]
+        points = [dataclasses.replace(point(0, quality), number=number) for number, quality in enumerate(qualities)]
+        points[0] = dataclasses.replace(points[0], vibration=seen)
+        return dataclasses.replace(trial(tmp_path, *points), recording=recording)
+
+    monkeypatch.setattr("rig.tuning.trials.carried_out", carried_out)
+    if not failed:
+        assert len(try_plan(tuning, tmp_path / "t.h5").levels.levels_m) == 7
+        return
+    with pytest.raises(
+        TuningError, match=r"the lowest level took 0\.01 N in one trial and 0\.05 N in the next; .* level 3"
+    ):
+        try_plan(tuning, tmp_path / "t.h5")
+
+
+def test_a_trial_without_points_repeats_nothing(tmp_path):
+    trial(tmp_path).check_repeats(trial(tmp_path, point(0)))
+
+
 def test_a_level_that_is_implausible_from_the_beginning_is_no_reason_for_finer_steps(tmp_path):
     assert trial(tmp_path, point(0, Quality.IMPLAUSIBLE), point(1)).finer_levels(PLANNED) is None
     assert trial(tmp_path, *map(point, range(4))).finer_levels(PLANNED) is None
