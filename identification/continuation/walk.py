@@ -16,10 +16,6 @@ _AHEAD = 20.0
 """Distance at which the tangent beyond a kink is found, in shortest steps."""
 _NEAR = 0.5
 """Farthest distance of a solution from the prediction, as a share of the step; beyond it may lie another part of the curve."""
-_LOCATED = 1e-7
-"""Last change of the distance to a turning point, as a share of the step, when it counts as located."""
-_MOST_TRIALS = 40
-"""Trials of that distance at most; some five are usual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,27 +129,16 @@ class Walk:
         return None if tangent is None else Point(v, last.units, tangent)
 
     def turn(self, last: Point, step: float) -> Float | None:
-        """Return the turning point within a step from ``last``; None if it is not found.
+        """Return the turning point within a step from ``last``; None if it is not found."""
+        from scipy.optimize import brentq
 
-        There the tangent has no part along the parameter. Its zero is found by regula falsi with the Illinois modification
-        (Dowell and Jarratt, BIT 11, 1971); the root finders of scipy would take a third of a second to load.
-        """
-        at = self.corrected(last, step)
-        if at is None or at.tangent[-1] * last.tangent[-1] >= 0.0:
-            return None
-        before, slope_before = 0.0, float(last.tangent[-1])
-        after, slope_after = step, float(at.tangent[-1])
-        for _ in range(_MOST_TRIALS):
-            length = after - slope_after * (after - before) / (slope_after - slope_before)
+        def direction(length: float) -> float:
             at = self.corrected(last, length)
-            if at is None:
-                return None
-            if abs(length - after) <= _LOCATED * step:
-                return at.v
-            slope = float(at.tangent[-1])
-            if slope * slope_after < 0.0:
-                before, slope_before = after, slope_after
-            else:
-                slope_before *= 0.5
-            after, slope_after = length, slope
-        return None
+            return np.nan if at is None else float(at.tangent[-1])
+
+        try:
+            length = brentq(direction, 0.0, step, xtol=1e-7 * step, rtol=1e-12)
+        except (ValueError, RuntimeError):
+            return None
+        at = self.corrected(last, length)
+        return None if at is None else at.v
